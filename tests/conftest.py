@@ -35,10 +35,10 @@ os.environ["LUPIN_DAY_HOURS"] = "00:00-00:00"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 # Before numpy: its own threads waiting for a busy core take ten times the time.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # Fast DDS 2.14 may crash in `destroy_node`, over the mutex of a removed port of shared memory.
 # The tests' own nodes have no such port; the processes that they start do (`domains.ros_env`).
-os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "SYSTEM_DEFAULT"  # as in the file; LOCALHOST adds one
+os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(__file__).with_name("support") / "dds.xml")
 
 # A client reads all root certificates, 24 ms each time; on loopback none is needed.
 _NOBODY = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)

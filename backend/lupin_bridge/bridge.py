@@ -21,7 +21,7 @@ from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, 
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
-from lupin_bridge.past.fields import Reported
+from lupin_bridge.past.fields import Reports
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
@@ -33,7 +33,7 @@ from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.runtime.estimates import Report, ReportRequest
+from lupin_twin.runtime.estimates import Report
 
 log = logging.getLogger(__name__)
 
@@ -327,14 +327,9 @@ class Bridge:
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
 
     async def _report_on(self, sensor: str, snapshot: Snapshot) -> Report:
-        wanted = Reported(
-            ReportRequest(sensor),
-            None,
-            snapshot.now_ns or snapshot.stamp_ns,
-            self.source.world.day_length_s,
-            self.criteria.sensors,
-        )
-        return await self.source.ask(wanted, wanted.cost_s(len(snapshot.tags)))
+        now_ns, day_s = snapshot.now_ns or snapshot.stamp_ns, self.source.world.day_length_s
+        wanted = Reports(sensor, None, now_ns, day_s, self.criteria.sensors)
+        return (await self.source.ask(wanted, wanted.cost_s(len(snapshot.tags))))[sensor]
 
     def _judge_state(self, snapshot: Snapshot) -> Judged:
         try:

@@ -301,8 +301,10 @@ def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
             tuple(value) if isinstance(value, list) else value, strict=not is_text
         )
     except ValidationError as error:
-        why = error.errors(include_url=False)[0]["msg"]
-        why = f"{why[0].lower()}{why[1:]}"
+        first = error.errors(include_url=False)[0]
+        why = f"{first['msg'][0].lower()}{first['msg'][1:]}"
+        if first["type"] == "tuple_type":
+            why = f"expected a list, such as [{_shown(name, value)}]"
         raise SettingError(f"{called} is {_shown(name, value)}: {why}") from None
     texts = found if isinstance(found, tuple) else (found,)
     if any(isinstance(text, str) and _CONTROL.search(text) for text in texts):
@@ -371,7 +373,7 @@ def strange_variables(environment: Iterable[str]) -> list[str]:
     """
     known = {*_NOT_IN_THE_TABLE, *(variable(spec.name) for spec in table())}
     return [
-        f"environment variable {name} is not a setting of the bridge{_meant(name, known)}"
+        f"environment variable {name} is not a setting of the bridge{meant(name, known)}"
         for name in sorted(environment)
         if name.startswith(ENV_PREFIX) and name not in known
     ]
@@ -392,7 +394,7 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
                 f"own, and name that file with {key}_file"
             )
         if key not in names:
-            raise SettingError(f"{place} is not a setting of the bridge{_meant(key, names)}")
+            raise SettingError(f"{place} is not a setting of the bridge{meant(key, names)}")
         yield key, place, value
 
 
@@ -422,6 +424,7 @@ def _line_of(key: str, text: str) -> str:
     return "" if found is None else f" line {text.count(chr(10), 0, found.start()) + 1}"
 
 
-def _meant(name: str, known: Iterable[str]) -> str:
+def meant(name: str, known: Iterable[str]) -> str:
+    """The known name that is most like a wrong one, as a question; empty: none is."""
     near = difflib.get_close_matches(name, known, n=1)
     return f" (did you mean {near[0]}?)" if near else ""

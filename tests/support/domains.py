@@ -69,7 +69,7 @@ def _leases_so_far() -> int:
 
 def ros_env(domain: int, **more: str) -> dict[str, str]:
     """The environment of a process in a ROS domain of this machine alone."""
-    ours = {name: it for name, it in os.environ.items() if name != "FASTDDS_BUILTIN_TRANSPORTS"}
+    ours = {name: it for name, it in os.environ.items() if name != "FASTRTPS_DEFAULT_PROFILES_FILE"}
     return {
         **ours,
         "ROS_DOMAIN_ID": str(domain),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, TypeVar
 
-from lupin_bridge.feed.query import Now, PastQuery, found_in
+from lupin_bridge.feed.query import LogReader, Now, PastQuery
 from lupin_bridge.past.plans import Query, answered
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
 from lupin_twin.core.notes import NotesRequest, PastNotes
@@ -17,13 +17,13 @@ from lupin_twin.core.past import (
     NotRemembered,
     PastRow,
     PastWrite,
-    RecentRequest,
-    ScansRequest,
+    PastWrites,
     SeriesPast,
     SeriesRequest,
     WritesRequest,
 )
-from lupin_twin.core.state import Snapshot
+from lupin_twin.core.state import Inspection, Scan, Snapshot
+from lupin_twin.estimate.engine import TagPast
 from lupin_twin.runtime.workers import Workers
 
 NS = 10**9
@@ -32,49 +32,64 @@ ResultT = TypeVar("ResultT")
 
 async def look_up(query: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
     """Answer a query in a worker here."""
-    return await asyncio.wrap_future(workers.submit(lambda stop: query(past.find, stop), 0.0))
+    log: Any = past
+    return await asyncio.wrap_future(workers.submit(lambda _: query(log), 0.0))
 
 
 @dataclass
 class MadeUp:
-    """The three queries of the past that a source answers, and the calls that it received.
+    """A `LogReader` without a log, and the calls that it received.
 
-    `points` are (stamp, value) by (tag, sensor or event); `lots` are the rows of an export.
+    `points` are (stamp, value) by (tag, sensor or event); `lots` are the rows of an export. What
+    was `scanned` is the answer for any period.
     """
 
     now_ns: int = 1_000 * NS
     points: dict[tuple[str, str], list[tuple[int, float]]] = field(default_factory=dict)
     lots: list[list[PastRow]] = field(default_factory=list)
     snapshot: Snapshot = field(default_factory=lambda: Snapshot(0, "map", ()))
+    scanned: tuple[PastWrite, ...] = ()
+    pasts: list[TagPast] = field(default_factory=list)
     error: Exception | None = None
     requested: list[object] = field(default_factory=list)
     costs: list[float] = field(default_factory=list)
     lots_taken: int = 0
     is_closed: bool = False
 
-    def find(self, need: Any) -> Any:
-        """The part of the past that a query needs."""
-        if isinstance(need, SeriesRequest):
-            return self.series(need)
-        if isinstance(need, RecentRequest):
-            return self.recent(need)
-        if isinstance(need, ScansRequest):
-            return ()
-        if isinstance(need, NotesRequest):
-            return PastNotes("", 0, ())  # no notes
-        if isinstance(need, WritesRequest):
-            raise NotRemembered("the log is not read here")
-        return self.state_at(need)
+    @staticmethod
+    def should_stop() -> bool:
+        """No query is cancelled."""
+        return False
 
-    def state_at(self, at_ns: int) -> Snapshot:
+    def notes(self, _: NotesRequest) -> PastNotes:
+        """There are none."""
+        return PastNotes("", 0, ())
+
+    def writes(self, _: WritesRequest) -> PastWrites:
+        """The alarms do without a log."""
+        raise NotRemembered("the log is not read here")
+
+    def state(self, at_ns: int) -> Snapshot:
         """The one state, for any moment."""
         self._note(at_ns)
         return replace(self.snapshot, stamp_ns=at_ns)
 
-    def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
-        """Nothing: the state has everything."""
-        self._note(request.at_ns)
+    def recent(self, at_ns: int) -> tuple[PastWrite, ...]:
+        """What was scanned; usually nothing: the state has everything."""
+        self._note(at_ns)
+        return self.scanned
+
+    def readings(self, *_: object) -> list[TagPast]:
+        """What an estimate is made of."""
+        return self.pasts
+
+    def scans(self, *_: object) -> tuple[PastWrite, ...]:
+        """Nothing before that."""
         return ()
+
+    def latest(self, *_: object) -> list[Scan | Inspection]:
+        """Nothing: the state is ahead of the log."""
+        return []
 
     def series(self, request: SeriesRequest) -> SeriesPast:
         """The points of a period, or the requested number of buckets."""
@@ -132,6 +147,6 @@ class MadeUp:
 def answered_by(log: Any, query: Query) -> bytes:
     """The body of a query's answer over a log, as the past process makes it."""
     now = Now(2**62, "map", UNKNOWN_JOURNAL)
-    answer = answered(query, "", lambda need: found_in(need, now, log), lambda: False).answer
+    answer = answered(query, "", LogReader(log, now)).answer
     assert answer is not None
     return answer.body

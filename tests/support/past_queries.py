@@ -5,47 +5,44 @@ import sys
 import threading
 import time
 
-from lupin_bridge.feed.query import Find
+from lupin_bridge.feed.query import LogReader
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_twin.core.past import PastRefused
-from lupin_twin.core.state import Snapshot
-from lupin_twin.runtime.workers import ShouldStop
 
 
-def tags_at(at_ns: int, find: Find, _: ShouldStop) -> int:
+def tags_at(at_ns: int, log: LogReader) -> int:
     """The number of tags."""
-    snapshot: Snapshot = find(at_ns)
-    return len(snapshot.tags)
+    return len(log.state(at_ns).tags)
 
 
-def endless(_: Find, should_stop: ShouldStop) -> None:
+def endless(log: LogReader) -> None:
     """Work that ends when it is cancelled, and not before."""
-    while not should_stop():
+    while not log.should_stop():
         time.sleep(0.001)
 
 
-def at_work(_: Find, __: ShouldStop) -> tuple[int, int]:
+def at_work(_: LogReader) -> tuple[int, int]:
     """How many `endless` run in that process, and its nice value."""
     frames = [sys._current_frames().get(thread.ident or 0) for thread in threading.enumerate()]
     running = [frame for frame in frames if frame and frame.f_code is endless.__code__]
     return len(running), os.getpriority(os.PRIO_PROCESS, 0)
 
 
-def sevens(count: int, _: Find, __: ShouldStop) -> Answered:
+def sevens(count: int, _: LogReader) -> Answered:
     """An answer with that many bytes."""
     return Answered("x", Answer(b"7" * count, "text/plain", {}))
 
 
-def refused(_: Find, __: ShouldStop) -> None:
+def refused(_: LogReader) -> None:
     raise PastRefused("x is 7, the limit is 6")
 
 
-def faulty(_: Find, __: ShouldStop) -> None:
+def faulty(_: LogReader) -> None:
     raise ZeroDivisionError("a fault")
 
 
-def unpicklable(_: Find, __: ShouldStop) -> None:
+def unpicklable(_: LogReader) -> None:
     class LocalError(Exception):
         pass
 

@@ -55,9 +55,11 @@ IMPORTED: Final = (
 # when one of them differs, a process has to start anew.
 _READ_LATE: Final = (
     "FASTDDS_",
+    "FASTRTPS_",
     "LUPIN_",
     "PGPASSWORD",
     "PYTEST_",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
     "ROS_DOMAIN_ID",
     "ROS_LOG_DIR",
     "SSL_CERT_FILE",

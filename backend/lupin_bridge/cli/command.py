@@ -18,6 +18,7 @@ import time
 from collections import Counter
 from collections.abc import Hashable, Sequence
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import Final, NoReturn
 
 from lupin_bridge import __version__
@@ -29,6 +30,7 @@ from lupin_bridge.settings import (
     SettingError,
     Settings,
     limits_of,
+    meant,
     option,
     settings_from,
     strange_variables,
@@ -147,7 +149,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     limit_blas_threads()
     return_large_blocks()
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
-    options = parser().parse_args(own)
+    for flag, rule in pairwise(ros_args):
+        if flag in {"-p", "--param", "-r", "--remap"} and ":=" not in rule:
+            _fail(f"{flag} is {rule!r}, expected NAME:=VALUE")
+    options, unknown = parser().parse_known_args(own)
+    if unknown:
+        name = unknown[0].partition("=")[0]
+        known = [option(spec.name) for spec in table()] if options.role in ROLES else []
+        remedy = ": put it after --ros-args" if name in _OF_ROS else meant(name, known)
+        _fail(f"{name} is not an option of {options.role}{remedy}")
     if options.role == "adapt":
         return adapt.run(options, ros_args)
     if options.role in _WITHOUT_ROS:
@@ -197,6 +207,9 @@ ROLES = {
     "fleet": "show every greenhouse of an archive on one page; run as many as needed",
 }
 
+
+# Options of ROS that people give without --ros-args.
+_OF_ROS = ("-p", "--param", "-r", "--remap", "--params-file")
 
 # Limits of --speed, and of --seed: of the patrol, and of a recording's player.
 PATROL_SPEEDS = (0.1, 50.0)

@@ -6,6 +6,7 @@ A demo also needs what feeds its twin, a journal of its own, and a past.
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import logging
 import os
@@ -224,6 +225,13 @@ def run(
             raise SettingError(str(error)) from error
 
 
+_REMEDIES = {
+    errno.EADDRINUSE: ", stop the program that listens there, or choose another --port",
+    errno.EACCES: ", choose a --port from 1024 on",
+    errno.EADDRNOTAVAIL: ", --host must be an address of this machine",
+}
+
+
 def _open_listener(settings: Settings, access: Access) -> socket.socket:
     """Listen, and warn of who may read.
 
@@ -238,8 +246,9 @@ def _open_listener(settings: Settings, access: Access) -> socket.socket:
         listener = listen(settings.host, settings.port)
     except OSError as error:
         where = "" if path else f" port {settings.port}"
+        remedy = "" if path else _REMEDIES.get(error.errno or 0, "")
         raise SettingError(
-            f"cannot listen on {settings.host}{where}: {error.strerror or error}"
+            f"cannot listen on {settings.host}{where}: {error.strerror or error}{remedy}"
         ) from error
     if path:  # none but its owner and group reach it
         return listener

@@ -16,24 +16,24 @@ import struct
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
-from typing import IO, Any, Final, TypeVar
+from typing import IO, TYPE_CHECKING, Any, Final, TypeVar
 
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
-from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.notes import NotesRequest
+from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import (
     PastRow,
-    PeriodRequest,
-    RecentRequest,
-    ScansRequest,
+    PastWrite,
+    PastWrites,
+    SeriesPast,
     SeriesRequest,
     WritesRequest,
     check_moment,
 )
+from lupin_twin.core.state import Inspection, Scan, Snapshot
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import latest
@@ -41,28 +41,10 @@ from lupin_twin.journal.writes import Export, lots, notes, observed, recent, sca
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
-ResultT = TypeVar("ResultT")
+if TYPE_CHECKING:
+    from lupin_twin.estimate.engine import TagPast
 
-# What a query needs of the log, and the type of the result. A moment, ns of ROS time: `Snapshot`; a
-# series: `SeriesPast`; what was recent at a moment, or scanned up to it: a tuple of `PastWrite`;
-# what was received, or observed in a period: `PastWrites`; notes: `PastNotes`; a tag's last scans:
-# `History`; or a function that reads the log by itself, such as an export's step.
-Need = (
-    int
-    | SeriesRequest
-    | RecentRequest
-    | ScansRequest
-    | WritesRequest
-    | PeriodRequest
-    | NotesRequest
-    | LatestRequest
-    | Callable[[sqlite3.Connection], Any]
-)
-# Looks up a need in the log; all needs of a query see the same state of the log.
-Find = Callable[[Need], Any]
-# Makes an answer of what is found. It ends early if `should_stop` says that nobody waits for it.
-# Queries and answers can be pickled.
-PastQuery = Callable[[Find, ShouldStop], ResultT]
+ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,19 +56,78 @@ class Now:
     condition: Condition
 
 
-def as_found(need: Need, find: Find, _should_stop: ShouldStop) -> Any:
-    """A `PastQuery` that answers with what was found, unchanged."""
-    return find(need)
+class LogReader:
+    """A log as a query sees it: unchanged while that looks things up, and up to `now`.
+
+    If `should_stop()`, nobody waits any more, and the next lookup ends the query, as SQLite ends an
+    interrupted statement.
+    """
+
+    def __init__(self, connection: Any, now: Now, should_stop: ShouldStop = lambda: False) -> None:
+        self._connection = connection
+        self._now = now
+        self.should_stop = should_stop
+
+    @property
+    def connection(self) -> Any:
+        """The log itself, for a lookup that has no method here."""
+        if self.should_stop():
+            raise sqlite3.OperationalError("interrupted")
+        return self._connection
+
+    def state(self, at_ns: int) -> Snapshot:
+        """See `fold.state_at`; raises `PastRefused` for a moment that is yet to come."""
+        check_moment(at_ns, self._now.stamp_ns)
+        return state_at(self.connection, at_ns, self._now.frame_id)
+
+    def series(self, request: SeriesRequest) -> SeriesPast:
+        """See `queries.series`."""
+        return series(self.connection, request, self._now.stamp_ns)
+
+    def recent(self, at_ns: int) -> tuple[PastWrite, ...]:
+        """See `writes.recent`; raises as `state` does."""
+        check_moment(at_ns, self._now.stamp_ns)
+        return recent(self.connection, at_ns)
+
+    def scans(self, since_ns: int, at_ns: int, sensors: Collection[str]) -> tuple[PastWrite, ...]:
+        """See `writes.scans`; raises as `state` does."""
+        check_moment(at_ns, self._now.stamp_ns)
+        return scans(self.connection, since_ns, at_ns, sensors)
+
+    def writes(self, request: WritesRequest) -> PastWrites:
+        """See `writes.writes`."""
+        return writes(self.connection, request)
+
+    def observed(self, start_ns: int, end_ns: int) -> PastWrites:
+        """See `writes.observed`."""
+        return observed(self.connection, start_ns, end_ns)
+
+    def latest(self, tag_id: str, count: int) -> list[Scan | Inspection]:
+        """See `rows.latest`."""
+        return latest(self.connection, tag_id, count)
+
+    def readings(
+        self, sensor: str, at_ns: int, day_length_s: float, days: float = 1.0
+    ) -> list[TagPast]:
+        """See `estimates.readings_at`."""
+        from lupin_twin.runtime.estimates import readings_at  # noqa: PLC0415  # few queries need it
+
+        return readings_at(self.connection, sensor, at_ns, day_length_s, days)
+
+    def notes(self, request: NotesRequest) -> PastNotes:
+        """See `writes.notes`."""
+        return notes(self.connection, request)
+
+
+# Makes an answer of what it looks up in a log. Queries and answers can be pickled.
+PastQuery = Callable[[LogReader], ResultT]
 
 
 def export_step(
-    export: Export,
-    write: Callable[[Sequence[PastRow]], ResultT],
-    find: Find,
-    _should_stop: ShouldStop,
+    export: Export, write: Callable[[Sequence[PastRow]], ResultT], log: LogReader
 ) -> tuple[Export | None, list[ResultT]]:
     """A `PastQuery`: the rest of the export (None: complete), and the next lots by `write`."""
-    rows: list[PastRow] | None = find(export.step)
+    rows = export.step(log.connection)
     return (None, []) if rows is None else (export, [write(lot) for lot in lots(rows)])
 
 
@@ -142,15 +183,7 @@ class Child:
         running.add_done_callback(partial(self._reply, number))
 
     def _search(self, query: PastQuery[Any], now: Now) -> Search:
-        def search(log: sqlite3.Connection, should_stop: ShouldStop) -> Any:
-            def find(need: Any) -> Any:
-                if should_stop():  # as SQLite ends an interrupted statement
-                    raise sqlite3.OperationalError("interrupted")
-                return found_in(need, now, log)
-
-            return query(find, should_stop)
-
-        return search
+        return lambda connection, should_stop: query(LogReader(connection, now, should_stop))
 
     # --- in a worker's thread -------------------------------------------------------------------
 
@@ -165,30 +198,6 @@ class Child:
         with self._sending:
             self._out.writelines((HEAD.pack(number, len(answer)), answer))
             self._out.flush()
-
-
-_OF_LOG: Final[dict[Any, Callable[[sqlite3.Connection, Any], Any]]] = {
-    WritesRequest: writes,
-    PeriodRequest: observed,
-    NotesRequest: notes,
-    LatestRequest: latest,
-}
-
-
-def found_in(need: Any, now: Now, log: sqlite3.Connection) -> Any:
-    """What a query needs, looked up in a log."""
-    match need:
-        case SeriesRequest():
-            return series(log, need, now.stamp_ns)
-        case RecentRequest() | ScansRequest():
-            check_moment(need.at_ns, now.stamp_ns)
-            return recent(log, need) if isinstance(need, RecentRequest) else scans(log, need)
-        case int():
-            check_moment(need, now.stamp_ns)
-            return state_at(log, need, now.frame_id)
-        case _:
-            look = _OF_LOG.get(type(need))
-            return need(log) if look is None else look(log, need)
 
 
 def _portable(error: BaseException) -> BaseException:

@@ -13,10 +13,11 @@ from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import methodcaller
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import Now, PastQuery, as_found, export_step
+from lupin_bridge.feed.query import Now, PastQuery, export_step
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, Origin
 from lupin_twin.core.drops import Counts, Recent
@@ -303,11 +304,11 @@ class TwinSource(ABC):
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The received scans and inspections, in the order of receipt."""
-        return await self.ask(partial(as_found, request), WRITES_S)
+        return await self.ask(methodcaller("writes", request), WRITES_S)
 
     async def notes(self, request: NotesRequest) -> PastNotes:
         """The notes that people wrote."""
-        return await self.ask(partial(as_found, request), NOTES_S)
+        return await self.ask(methodcaller("notes", request), NOTES_S)
 
     # Only the process that keeps the journal writes it.
     writes_notes = False

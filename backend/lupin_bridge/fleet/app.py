@@ -373,11 +373,10 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
 
     async def over_sites(request: Request, query: Compare | SitesReport) -> Response:
         about = Now(0, "", UNKNOWN_JOURNAL)
-        untyped: Any = query  # see `reader`
 
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request), is_large=True):
-                return cast("Answer", await fleet.past.ask(untyped, about, COMPARE_S))
+                return await fleet.past.ask(query, about, COMPARE_S)
 
         return await respond(request, query, compute)
 

@@ -22,6 +22,7 @@ import orjson
 from annotated_types import Interval
 
 from lupin_bridge import query_string
+from lupin_bridge.feed.query import LogReader
 from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Sensors
 from lupin_bridge.query_string import Name, OfPeriod, OfReport, Parameters, needed, parameter, read
@@ -82,8 +83,8 @@ class Compare:
     steps: Grid
     unit: str
 
-    def answer(self, connection: Any) -> Answer:
-        """The answer, from the count and sum of readings by site and bucket."""
+    def __call__(self, log: LogReader) -> Answer:
+        """A `PastQuery`: the answer, from the count and sum of readings by site and bucket."""
         steps = self.steps
         query = {
             "sensor": self.sensor_type,
@@ -92,7 +93,7 @@ class Compare:
             "last": steps.end_ns // HOUR_NS,
             "width": steps.bucket_ns // HOUR_NS,
         }
-        found = connection.execute(_HOURS, query).fetchall()
+        found = log.connection.connection.execute(_HOURS, query).fetchall()
         return content_answer(orjson.dumps(self._body(_means(self, found))))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
@@ -247,8 +248,9 @@ class SitesReport:
     start_ns: int
     end_ns: int
 
-    def answer(self, connection: Any) -> Answer:
-        """The answer, from the counts by site and event, and the newest notes."""
+    def __call__(self, log: LogReader) -> Answer:
+        """A `PastQuery`: the answer, from the counts by site and event, and the newest notes."""
+        connection = log.connection.connection
         query = {
             "sites": [site for site, *_ in self.sites],
             "first": self.start_ns // HOUR_NS,

@@ -22,9 +22,8 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, Now, PastQuery, Search
+from lupin_bridge.feed.query import Child, LogReader, Now, PastQuery, Search
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.compare import Compare, SitesReport
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS, NotRemembered
@@ -54,14 +53,6 @@ logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Latest:
-    """The query of what a site's twin would report now, as far as its log has arrived."""
-
-    # Hash of the map that is known already.
-    map_hash: int
-
-
-@dataclass(frozen=True, slots=True)
 class Reported:
     """All tags as of the site's time now; what is kept of the past, and what of it is simulated.
 
@@ -85,16 +76,10 @@ class ArchiveChild(Child):
     def __init__(self) -> None:
         super().__init__(ArchiveRecall)
 
-    def _search(
-        self, query: PastQuery[Any] | Latest | Note | Compare | SitesReport, now: Now
-    ) -> Search:
+    def _search(self, query: PastQuery[Any] | Note, now: Now) -> Search:
         site = now.condition.path
-        if isinstance(query, Latest):
-            return lambda connection, _: _latest(SiteLog(connection, site), query, now.frame_id)
         if isinstance(query, Note):
             return lambda _, stop: _write_note(site, query, stop)
-        if isinstance(query, Compare | SitesReport):
-            return lambda connection, _: query.answer(connection)
         found = super()._search(query, now)
         return lambda connection, stop: found(SiteLog(connection, site), stop)
 
@@ -123,8 +108,12 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         return written
 
 
-def _latest(log: SiteLog, request: Latest, frame_id: str) -> Reported:
-    journal: Any = log
+def latest(known_map: int, frame_id: str, reader: LogReader) -> Reported:
+    """A `PastQuery`: what a site's twin would report now, as far as its log has arrived.
+
+    `known_map` is the hash of the map that is known already.
+    """
+    log = reader.connection
     every = runs(log.execute)
     span = span_at(every, FOREVER_NS)
     is_wall_clock = span is None or not span.run.begun.is_simulated
@@ -135,14 +124,14 @@ def _latest(log: SiteLog, request: Latest, frame_id: str) -> Reported:
     if not is_wall_clock:
         now_ns = stamp_ns + max(0, now_ns - (arrival_ns or now_ns))
     # Includes stamps of a robot's clock that is a little ahead of this one: they were received.
-    known = state_at(journal, FOREVER_NS, frame_id)
+    known = state_at(log, FOREVER_NS, frame_id)
     return Reported(
         Snapshot(max(now_ns, stamp_ns), frame_id, known.tags),
         is_wall_clock,
         world_of(log),
-        kept(journal),
-        simulated(journal),
-        *_newer_map(log, request.map_hash),
+        kept(log),
+        simulated(log),
+        *_newer_map(log, known_map),
     )
 
 

@@ -12,6 +12,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 from lupin_bridge.feed.past_process import PastProcess
@@ -19,8 +20,8 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, Periodic, end
-from lupin_bridge.fleet.overview import Archive, Site
-from lupin_bridge.fleet.reader import Latest, Reported
+from lupin_bridge.fleet.overview import MAX_AHEAD_NS, Archive, Site
+from lupin_bridge.fleet.reader import Reported, latest
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
@@ -126,6 +127,10 @@ class Watching:
 # --- the source of one site's page ----------------------------------------------------------------
 
 HEARTBEAT_S: Final = 1.0
+_AHEAD: Final = (
+    "The clock of this greenhouse is more than ten minutes ahead of the archive's: readings are"
+    " older than they look. Set the clock."
+)
 
 
 class SiteTwin(TwinSource):
@@ -208,7 +213,8 @@ class SiteTwin(TwinSource):
         last_seq = self._site.last_seq
         if last_seq == self._seq or not self._watching.archive.is_reachable:
             return
-        found: Reported = await self._in_time(self._reading(Latest(self._map_hash)))
+        query = partial(latest, self._map_hash, self._parameters.frame_id)
+        found: Reported = await self._in_time(self._reading(query))
         if found.map_hash != self._map_hash:
             self._map, self._map_hash = found.occupancy_map, found.map_hash
         self._reported = found
@@ -226,6 +232,9 @@ class SiteTwin(TwinSource):
         if reported is None or not (is_live or said != self._said):
             return
         self._said = said
+        is_ahead = _newest_ns(reported) - self._watching.now_ns > MAX_AHEAD_NS
+        if is_ahead and reported.is_wall_clock:
+            problem = problem or _AHEAD
         stamp_ns = self._now_ns(reported)
         # By the same clock as `now`, if that is the wall's: a later moment would be refused.
         now_ns = stamp_ns if reported.is_wall_clock else self._watching.now_ns
@@ -299,7 +308,7 @@ class SiteTwin(TwinSource):
 
 
 def _newest_ns(reported: Reported) -> int:
-    """The last moment of a simulation that every replica knows of."""
+    """When the newest observation was: of a simulation, the last moment all replicas know of."""
     return max((tag.last_observed_ns or 0 for tag in reported.snapshot.tags), default=0)
 
 

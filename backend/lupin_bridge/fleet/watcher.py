@@ -21,31 +21,37 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, Now, Search
+from lupin_bridge.feed.query import Child, LogReader, Now, Search
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
+from lupin_bridge.fleet.overview import (
+    LIVE_S,
+    MAX_AHEAD_NS,
+    Site,
+    causes,
+    dots,
+    now_json,
+    worst_first,
+)
 from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
 from lupin_bridge.judge.scans import recent_writes
-from lupin_bridge.judge.verdict import Health
+from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
-from lupin_twin.core.diagnostics import Origin, origin_of
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import (
     FOREVER_NS,
     NotRemembered,
     PastWrite,
-    RecentRequest,
-    ScansRequest,
 )
 from lupin_twin.core.state import Snapshot, TagState, same_tags
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
-from lupin_twin.journal.writes import notes, recent, scans, writes
+from lupin_twin.journal.writes import notes, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -292,7 +298,9 @@ class Watcher:
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
         self.sites[name] = replace(
             site,
-            verdict=judgement.house.verdict,
+            verdict=Verdict.UNKNOWN
+            if newest_ns - now_ns > MAX_AHEAD_NS
+            else judgement.house.verdict,
             dots=dots(judged.snapshot.tags, judgement.tags),
         )
 
@@ -343,10 +351,7 @@ class Watcher:
 
 
 def _recent(log: Any, at_ns: int) -> list[PastWrite]:
-    def find(need: RecentRequest | ScansRequest) -> tuple[PastWrite, ...]:
-        return recent(log, need) if isinstance(need, RecentRequest) else scans(log, need)
-
-    return recent_writes(at_ns, find)
+    return recent_writes(at_ns, LogReader(log, Now(at_ns, "", UNKNOWN_JOURNAL)))
 
 
 def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:

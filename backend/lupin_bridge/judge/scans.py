@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from heapq import nlargest
 from itertools import chain, groupby, takewhile
 from operator import attrgetter, itemgetter
-from typing import Final
+from typing import Any, Final
 
 from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, SINCE_NS, Day, Light, says_day
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
@@ -24,8 +24,6 @@ from lupin_twin.core.past import (
     SILENCE_NS,
     SILENT_INTERVALS,
     PastWrite,
-    RecentRequest,
-    ScansRequest,
     usual_ns,
 )
 from lupin_twin.core.state import STATUS_OK, TagState, sure_species
@@ -248,7 +246,7 @@ class RecentScans:
     def of(
         cls, tags: Sequence[TagState], writes: Iterable[PastWrite], day_of: DayOf
     ) -> RecentScans:
-        """The recent scans of a state; `writes` is the log of them (see `RecentRequest`)."""
+        """The recent scans of a state; `writes` is the log of them (see `recent_writes`)."""
         found = cls(day_of)
         # Of one moment, the state takes precedence over the log.
         of_state = (write for tag in tags for write in writes_of(_UNKNOWN, tag))
@@ -358,15 +356,13 @@ def writes_of(before: TagState, tag: TagState) -> list[PastWrite]:
     return sorted(found, key=_stamp_ns)
 
 
-def recent_writes(
-    at_ns: int, find: Callable[[RecentRequest | ScansRequest], tuple[PastWrite, ...]], *_: object
-) -> list[PastWrite]:
-    """All that `RecentScans` needs of the log at a moment; `find` looks it up.
+def recent_writes(at_ns: int, log: Any) -> list[PastWrite]:
+    """All that `RecentScans` needs of the log, a `LogReader`, at a moment.
 
     That is what was recent, and what light sensors said before that, by which it is judged.
     """
-    before = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, frozenset({LIGHT})))
-    return [*light_turns(before), *find(RecentRequest(at_ns))]
+    before = log.scans(max(0, at_ns - SINCE_NS), at_ns, {LIGHT})
+    return [*light_turns(before), *log.recent(at_ns)]
 
 
 def light_turns(scans: Iterable[PastWrite]) -> Iterator[PastWrite]:

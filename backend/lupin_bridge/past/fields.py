@@ -13,14 +13,14 @@ from typing import Final
 import orjson
 
 from lupin_bridge import field as formats
-from lupin_bridge.feed.query import Find
+from lupin_bridge.feed.query import LogReader
 from lupin_bridge.field import JSON, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, Sensor, Sensors
 from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s, with_daily
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream.pollers import sensors_of
+from lupin_bridge.stream import pollers
 from lupin_twin.core.past import MAX_POINTS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TagState, samples_of
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast, moment_of
@@ -46,7 +46,6 @@ from lupin_twin.runtime.estimates import (
     Report,
     ReportRequest,
     estimate_at,
-    readings_at,
     report_of,
 )
 from lupin_twin.runtime.workers import ShouldStop
@@ -101,15 +100,15 @@ class Field(StateQuery):
         rules, sensors = self.rules, self.criteria.sensors
         return etag_of(f"newest {name}", (revision, self.query, rules, sensors.text))
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         at_ns = self.at_ns or 0
-        snapshot: Snapshot = find(at_ns)
+        snapshot = log.state(at_ns)
         daily = DAILY.get(self.query.sensor_type)
         if daily is not None:
             by = self.criteria
             tags = with_daily(
-                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=find
+                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=log.series
             )
             snapshot = replace(snapshot, tags=tuple(tags))
         return self.plan(snapshot)
@@ -238,7 +237,7 @@ class Estimated(Field):
         request = EstimateRequest(self.query.request(box, max_cells))
         return tags * NEWEST_S_PER_TAG + AS_OF * estimate_cost_s(request, tags, max_cells)
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`.
 
         Raises:
@@ -246,14 +245,11 @@ class Estimated(Field):
 
         """
         at_ns = self.now_ns if self.at_ns is None else self.at_ns
-        snapshot: Snapshot = find(at_ns)
+        snapshot = log.state(at_ns)
         box = self.request(snapshot)
         # A minute more than a day: so no reading is missing while the estimate stays the same.
         reach_s = self.day_length_s * (1.0 + 1.0 / MINUTES_A_DAY)
-        up_to_ns = at_ns
-        pasts: list[TagPast] = find(
-            lambda log: readings_at(log, box.sensor_type, up_to_ns, reach_s)
-        )
+        pasts = log.readings(box.sensor_type, at_ns, reach_s)
         if self.at_ns is None:
             at_ns = moment_of(pasts, at_ns, self.day_length_s)
         sensor = self.criteria.sensors.named(box.sensor_type)
@@ -296,88 +292,68 @@ def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list
 
 
 @dataclass(frozen=True, slots=True)
-class Reported:
-    """A `PastQuery` for the report on a sensor's estimates, as of a moment of the log.
+class Reports:
+    """The report on a sensor's estimates (None: on those of every sensor), as of a moment.
 
-    Without a moment it is that of the current estimate, see `Estimated`. `occupancy` is where
-    another tag could stand.
+    Without a moment it is that of the current estimate, see `Estimated`. `max_places` and
+    `occupancy` are how many other tags are advised, and where they could stand; None: none, and
+    anywhere. This is a `Query`, whose answer `write_json` writes, and a `PastQuery` for the reports
+    by sensor.
     """
 
-    request: ReportRequest
+    sensor_type: str | None
     at_ns: int | None
     now_ns: int
     day_length_s: float
     sensors: Sensors = field(compare=False)
+    write_json: Callable[[Mapping[str, Report]], bytes] = pollers.quality
+    max_places: int | None = None
     occupancy: OccupancyMap | None = field(default=None, compare=False)
 
-    def __call__(self, find: Find, should_stop: ShouldStop) -> Report:
-        """Make the report of what the log has."""
-        pasts, at_ns = self.look_up(find)
-        return self.report(pasts, at_ns, should_stop)
-
-    @property
-    def up_to_ns(self) -> int:
-        """The moment up to which the log counts."""
-        return self.now_ns if self.at_ns is None else self.at_ns
-
-    @staticmethod
-    def cost_s(tags: int) -> float:
-        """The approximate cost of a report, s of one core."""
-        return REPORT_DAYS * tags * NEWEST_S_PER_TAG + REPORT_S
-
-    def look_up(self, find: Find) -> tuple[list[TagPast], int]:
-        """The plausible readings of `REPORT_DAYS`, and the moment of the report."""
-        name, day_s = self.request.sensor_type, self.day_length_s
-        up_to_ns = self.up_to_ns
-        find(up_to_ns)  # refuses a moment that is yet to come
-        pasts: list[TagPast] = find(
-            lambda log: readings_at(log, name, up_to_ns, day_s, REPORT_DAYS)
-        )
-        at_ns = moment_of(pasts, up_to_ns, day_s) if self.at_ns is None else self.at_ns
-        return _that_count(pasts, 0, self.sensors.named(name)), at_ns
-
-    def report(self, pasts: Sequence[TagPast], at_ns: int, should_stop: ShouldStop) -> Report:
-        """The report of these readings."""
-        day_s = self.day_length_s
-        return report_of(
-            self.request, pasts, at_ns, day_s, occupancy=self.occupancy, should_stop=should_stop
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Reports:
-    """The report that is wanted, or those on all sensors, as JSON by a function of `pollers`."""
-
-    wanted: Reported
-    is_of_all: bool
-    write_json: Callable[[Mapping[str, Report]], bytes]
+    def __call__(self, log: LogReader) -> Mapping[str, Report]:
+        """Make the reports of what the log has."""
+        return self._made(self._look_up(log), log.should_stop)
 
     def cost_s(self, tags: int) -> float:
         """See `Query`: a greenhouse has a handful of sensors."""
-        return self.wanted.cost_s(tags) * (5 if self.is_of_all else 1)
+        of_one_s = REPORT_DAYS * tags * NEWEST_S_PER_TAG + REPORT_S
+        return of_one_s * (1 if self.sensor_type else 5)
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
-        every = [self.wanted]
-        if self.is_of_all:
-            snapshot: Snapshot = find(self.wanted.up_to_ns)
-            names = sensors_of(snapshot)
-            every = [replace(self.wanted, request=ReportRequest(name)) for name in names]
-        found = [(one, *one.look_up(find)) for one in every]
-        occupancy = self.wanted.occupancy
+        found = self._look_up(log)
+        occupancy = self.occupancy
         built_from = (
-            [(one.request, at_ns, pasts) for one, pasts, at_ns in found],
-            self.wanted.day_length_s,
-            self.wanted.sensors.text,
+            found,
+            self.day_length_s,
+            self.sensors.text,
             None if occupancy is None else digest_of(occupancy),
         )
+        return plan_of(
+            etag_of(f"estimate {self.write_json.__name__}", built_from),
+            lambda should_stop: self.write_json(self._made(found, should_stop)),
+        )
 
-        def write(should_stop: ShouldStop) -> bytes:
-            return self.write_json(
-                {
-                    one.request.sensor_type: one.report(pasts, at_ns, should_stop)
-                    for one, pasts, at_ns in found
-                }
+    def _look_up(self, log: LogReader) -> list[_OfSensor]:
+        up_to_ns, day_s = self.now_ns if self.at_ns is None else self.at_ns, self.day_length_s
+        snapshot, found = log.state(up_to_ns), []
+        for name in [self.sensor_type] if self.sensor_type else pollers.sensors_of(snapshot):
+            pasts = log.readings(name, up_to_ns, day_s, REPORT_DAYS)
+            at_ns = moment_of(pasts, up_to_ns, day_s) if self.at_ns is None else self.at_ns
+            plausible_pasts = _that_count(pasts, 0, self.sensors.named(name))
+            found.append((ReportRequest(name, self.max_places), at_ns, plausible_pasts))
+        return found
+
+    def _made(self, found: Sequence[_OfSensor], should_stop: ShouldStop) -> dict[str, Report]:
+        return {
+            request.sensor_type: report_of(
+                *(request, pasts, at_ns, self.day_length_s),
+                occupancy=self.occupancy,
+                should_stop=should_stop,
             )
+            for request, at_ns, pasts in found
+        }
 
-        return plan_of(etag_of(f"estimate {self.write_json.__name__}", built_from), write)
+
+# What a report is made of: its moment, and the plausible readings of `REPORT_DAYS`.
+_OfSensor = tuple[ReportRequest, int, list[TagPast]]

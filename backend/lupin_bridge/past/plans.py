@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Final, Protocol
 
 import orjson
 
-from lupin_bridge.feed.query import Find
+from lupin_bridge.feed.query import LogReader
 from lupin_bridge.field import matches
 from lupin_bridge.judge.day import LIGHT, SINCE_NS, days_of, nights_by_light
 from lupin_bridge.judge.judging import Criteria, judge_once
@@ -26,7 +26,6 @@ from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.diagnostics import Condition
-from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.past import (
     DAY_NS,
     DEFAULT_POINTS,
@@ -36,9 +35,6 @@ from lupin_twin.core.past import (
     MAX_READINGS,
     Event,
     PastRefused,
-    PastWrite,
-    RecentRequest,
-    ScansRequest,
     SeriesPast,
     SeriesRequest,
     grid,
@@ -46,9 +42,7 @@ from lupin_twin.core.past import (
 )
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
-    Inspection,
     Reading,
-    Scan,
     Snapshot,
     TagState,
 )
@@ -90,7 +84,7 @@ class Query(Protocol):
     def cost_s(self, tags: int) -> float:
         """The cost of the lookups and of the answer with this many tags, s of one core."""
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """Look up what is needed of the log, and plan the answer."""
 
 
@@ -102,11 +96,11 @@ class Answered:
     answer: Answer | None
 
 
-def answered(query: Query, if_none_match: str, find: Find, should_stop: ShouldStop) -> Answered:
+def answered(query: Query, if_none_match: str, log: LogReader) -> Answered:
     """A `PastQuery` for a client that has the answers of these ETags (see If-None-Match)."""
-    plan = query.look(find)
+    plan = query.look(log)
     has_it = matches(if_none_match, plan.etag)
-    return Answered(plan.etag, None if has_it else plan.write(should_stop))
+    return Answered(plan.etag, None if has_it else plan.write(log.should_stop))
 
 
 # --- as of a moment -------------------------------------------------------------------------------
@@ -128,7 +122,7 @@ class StateQuery:
         """The cost of writing the answer with this many tags, s of one core."""
         return tags * self.tag_s
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         raise NotImplementedError
 
@@ -137,9 +131,9 @@ class StateQuery:
 class WholeState(StateQuery):
     """`schema.TwinState`: every tag."""
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
-        snapshot: Snapshot = find(self.at_ns or 0)
+        snapshot = log.state(self.at_ns or 0)
         etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
         return plan_of(etag, lambda _: StateJson().state(snapshot, snapshot.now_ns))
 
@@ -150,9 +144,9 @@ class OneTag(StateQuery):
 
     tag_id: str
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`, and `tag_of`."""
-        snapshot: Snapshot = find(self.at_ns or 0)
+        snapshot = log.state(self.at_ns or 0)
         found = tag_of(snapshot, self.tag_id)
         etag = etag_of("tag", (snapshot.stamp_ns, found))
         return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns))
@@ -168,13 +162,12 @@ class Health(StateQuery):
     criteria: Criteria = field(compare=False)
     tag_s = 1e-3
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         by, at_ns = self.criteria, self.at_ns or 0
-        snapshot: Snapshot = find(at_ns)
-        recent: tuple[PastWrite, ...] = find(RecentRequest(at_ns))
-        sensors = frozenset({LIGHT, *by.sensors.judged_by_the_day})
-        scans: tuple[PastWrite, ...] = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, sensors))
+        snapshot, recent = log.state(at_ns), log.recent(at_ns)
+        sensors = {LIGHT, *by.sensors.judged_by_the_day}
+        scans = log.scans(max(0, at_ns - SINCE_NS), at_ns, sensors)
         days = days_of(scans, by.sensors, by.is_day, by.day_number)
         judged = judge_once(snapshot, (*light_turns(scans), *recent), by, days=days)
         body = judgement(judged)
@@ -204,13 +197,13 @@ class History:
         # Both of its parts are read, and again for buckets.
         return own_s + 4 * series_s(request.tag_id, MAX_POINTS, tags)
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         sensors = self.criteria.sensors
-        past = derived_series(self.request, sensors, self.criteria.is_day, find)
+        past = derived_series(self.request, sensors, self.criteria.is_day, log.series)
         nights = self.criteria.nights(past.start_ns, past.end_ns)
         if not self.is_by_clock and self.request.event is None:
-            light = find(replace(self.request, sensor_type=LIGHT, end_ns=past.end_ns))
+            light = log.series(replace(self.request, sensor_type=LIGHT, end_ns=past.end_ns))
             nights = nights_by_light(zip(light.stamps_ns, light.means, strict=True), past.end_ns)
         return of_json(
             bodies.history_body(
@@ -236,28 +229,28 @@ class Timeline:
         silences_s = series_s(self.tag_id, MAX_POINTS, tags)
         return runs_s + 2 * len(bodies.COUNTED) * counted_s + silences_s
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`: the runs, every event over the one period, the silences."""
-        runs: SeriesPast = find(SeriesRequest(EVERY_TAG, Event.RUNS))
+        runs = log.series(SeriesRequest(EVERY_TAG, Event.RUNS))
         period = bodies.timeline_period(self.start_ns, self.end_ns, self.points, runs)
-        counted = self._counted(find, period.start_ns, period.end_ns)
+        counted = self._counted(log, period.start_ns, period.end_ns)
         coarsest = bodies.coarsest(period, counted.values())
         if coarsest != period:
             # The wider period also holds single events outside the first one.
             period = coarsest
-            counted = self._counted(find, period.start_ns, period.end_ns)
+            counted = self._counted(log, period.start_ns, period.end_ns)
         # Past what the log has so far, no silence is certain.
         until_ns = bodies.complete_to(self.journal, period.end_ns)
         until_ns = max(period.start_ns, period.end_ns if until_ns is None else until_ns)
-        silences: SeriesPast = find(
+        silences = log.series(
             SeriesRequest(self.tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS)
         )
         return of_json(bodies.timeline_body(runs, period, counted, silences, self.journal))
 
-    def _counted(self, find: Find, start_ns: int, end_ns: int) -> dict[Event, SeriesPast]:
+    def _counted(self, log: LogReader, start_ns: int, end_ns: int) -> dict[Event, SeriesPast]:
         points = self.points
         return {
-            event: find(SeriesRequest(self.tag_id, event, start_ns, end_ns, points))
+            event: log.series(SeriesRequest(self.tag_id, event, start_ns, end_ns, points))
             for event in bodies.COUNTED.values()
         }
 
@@ -277,10 +270,10 @@ class LatestOfTag:
         """See `Query`."""
         return SERIES_S + self.count * _WRITE_SCAN_S
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
-        found: list[Scan | Inspection] = find(LatestRequest(self.tag_id, self.count))
-        return of_json(history(self.tag_id, tag_history(found, self.newest, self.count)))
+        found = log.latest(self.tag_id, self.count)
+        return of_json(history(self.tag_id, found, self.newest, self.count))
 
 
 def series_s(tag_id: str, points: int, tags: int) -> float:

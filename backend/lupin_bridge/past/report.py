@@ -18,7 +18,7 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.alarms.board import active_first, notes_of_alarms
-from lupin_bridge.feed.query import Find
+from lupin_bridge.feed.query import LogReader
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import SITE, readings_of
 from lupin_bridge.judge.judging import Criteria
@@ -29,7 +29,7 @@ from lupin_bridge.serving.admission import content_answer
 from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.history import KIND_FLOWER
-from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals
+from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, withdrawals
 from lupin_twin.core.past import (
     EVERY_TAG,
     HOUR_NS,
@@ -38,13 +38,11 @@ from lupin_twin.core.past import (
     PastRefused,
     PastWrite,
     PastWrites,
-    PeriodRequest,
     RunSpan,
-    SeriesPast,
     SeriesRequest,
     silence_ns,
 )
-from lupin_twin.core.state import STATUS_OK, Reading, Snapshot, TagState
+from lupin_twin.core.state import STATUS_OK, Reading, TagState
 
 # A day at one scan a second has 86,400. Each takes some 25 us, and three times that where alarms
 # are derived; an answer has ten seconds.
@@ -81,22 +79,21 @@ class Report:
         """See `plans.Query`."""
         return REPORT_S
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `plans.Query`.
 
         Raises:
             PastRefused: more was observed in the period than one report may cover.
 
         """
-        hours = self._per_hour(find)
+        hours = self._per_hour(log)
         alarms_ns = self._alarms_from(hours)
         fold = _Fold(self, alarms_ns)
         for stretch in _stretches(hours, min(self.start_ns, alarms_ns), self.end_ns):
-            fold.take(find(PeriodRequest(*stretch)))
-        notes: PastNotes = find(NotesRequest())
-        snapshot: Snapshot = find(self.end_ns - 1)
+            fold.take(log.observed(*stretch))
+        notes, snapshot = log.notes(NotesRequest()).notes or (), log.state(self.end_ns - 1)
         known = [tag.tag_id for tag in snapshot.tags]
-        body, days = fold.body(notes.notes or (), known), fold.days()
+        body, days = fold.body(notes, known), fold.days()
         return self.plan(
             body,
             [
@@ -112,14 +109,14 @@ class Report:
     def _headers(self) -> dict[str, str]:
         return bodies.period_headers(self.journal, self.start_ns, self.end_ns)
 
-    def _per_hour(self, find: Find) -> Counter[int]:
+    def _per_hour(self, log: LogReader) -> Counter[int]:
         """How much was observed in each hour, of the lead and the period; keys are ns."""
         first_ns = max(1, self.start_ns - LEAD_NS) // HOUR_NS * HOUR_NS
         end_ns = -(-self.end_ns // HOUR_NS) * HOUR_NS
         found: Counter[int] = Counter()
         for event in (Event.SCANS, Event.FAILURES, Event.INSPECTIONS):
             points = max(1, (end_ns - first_ns) // HOUR_NS)
-            past: SeriesPast = find(SeriesRequest(EVERY_TAG, event, first_ns, end_ns, points))
+            past = log.series(SeriesRequest(EVERY_TAG, event, first_ns, end_ns, points))
             for at_ns, n in zip(past.stamps_ns, past.counts, strict=True):
                 found[at_ns // HOUR_NS * HOUR_NS] += n
         return found

@@ -149,6 +149,8 @@ class _Page:
             # If the log begins before the period, `kept_from` equals `from`.
             if body[name] is not None and (name != "kept_from" or body[name] != body["from"])
         ]
+        if body["kept_from"] == body["to"]:
+            known = [say("nothing_kept")]
         parts = [
             _head(self._lang, heading, period),
             f"<p><strong>{escape(hint)}</strong></p>" if hint else "",

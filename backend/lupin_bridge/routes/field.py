@@ -16,7 +16,7 @@ from lupin_bridge import query_string
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
-from lupin_bridge.past.fields import Estimated, Field, Reported, Reports
+from lupin_bridge.past.fields import Estimated, Field, Reports
 from lupin_bridge.query_string import AT, Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
@@ -38,7 +38,7 @@ from lupin_bridge.serving.admission import ClientLimitError
 from lupin_bridge.stream import pollers, schema
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report, ReportRequest
+from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report
 
 router = APIRouter()
 
@@ -259,10 +259,7 @@ async def quality(request: Request) -> Response:
     up to the last whole hour.
     """
     query = read(QualityQuery, request.query_params.multi_items())
-    # With `is_of_all`, the name is only a placeholder.
-    wanted = ReportRequest(query.sensor_type or "all")
-    is_of_all = query.sensor_type is None
-    return await _reports(request, wanted, query.at, pollers.quality, is_of_all=is_of_all)
+    return await _reports(request, query.sensor_type, query.at, pollers.quality)
 
 
 @read_route(
@@ -275,7 +272,7 @@ async def quality(request: Request) -> Response:
 async def tags(request: Request) -> Response:
     """Predicted from all other tags, and from the tag's own readings except the latest ones."""
     query = read(TagsQuery, request.query_params.multi_items())
-    return await _reports(request, ReportRequest(query.sensor_type), query.at, pollers.tags)
+    return await _reports(request, query.sensor_type, query.at, pollers.tags)
 
 
 @read_route(
@@ -291,28 +288,23 @@ async def advice(request: Request) -> Response:
     Without a map, and with `at`, they are around the tags: the log does not have past maps.
     """
     query = read(AdviceQuery, request.query_params.multi_items())
-    wanted = ReportRequest(query.sensor_type, query.places)
-    return await _reports(request, wanted, query.at, pollers.advice)
+    return await _reports(request, query.sensor_type, query.at, pollers.advice, query.places)
 
 
 async def _reports(
     request: Request,
-    report: ReportRequest,
+    sensor_type: str | None,
     at: str | None,
     write: Callable[[Mapping[str, Report]], bytes],
-    *,
-    is_of_all: bool = False,
+    places: int | None = None,
 ) -> Response:
     bridge = bridge_of(request)
     source = bridge.source
     now_ns = (await source.now()).stamp_ns
     at_ns = query_string.at_of(at, now_ns)
-    wanted = Reported(
-        report,
-        at_ns,
-        now_ns,
-        source.world.day_length_s,
-        bridge.criteria.sensors,
-        source.occupancy_map() if report.max_places and at_ns is None else None,
+    reports = Reports(
+        *(sensor_type, at_ns, now_ns, source.world.day_length_s, bridge.criteria.sensors, write),
+        max_places=places,
+        occupancy=source.occupancy_map() if places and at_ns is None else None,
     )
-    return await respond_past(request, Reports(wanted, is_of_all, write), "estimate")
+    return await respond_past(request, reports, "estimate")

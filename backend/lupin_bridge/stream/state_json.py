@@ -13,12 +13,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 
-from lupin_twin.core.history import TagHistory
+from lupin_twin.core.history import (
+    KIND_FLOWER,
+    KIND_TAG_READING,
+    KNOWN_BY_NOTHING,
+    key_of,
+    kind_of,
+)
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
+    STATUS_OK,
     Attempt,
+    Inspection,
     Pose,
+    Scan,
     Snapshot,
     TagState,
     age_seconds,
@@ -159,29 +168,85 @@ def header(stamp_ns: int, frame_id: str) -> dict[str, Any]:
     return {"stamp": stamp(stamp_ns), "frame_id": frame_id}
 
 
-def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
-    """`schema.TagHistory`."""
+def history(
+    tag_id: str, writes: Iterable[Scan | Inspection], newest: TagState | None, count: int
+) -> dict[str, Any]:
+    """`schema.TagHistory`: a tag's last `count` scans with readings, and as many attempts.
+
+    `newest` is the tag's state; it may hold what `writes`, read from the journal, lack so far. Of
+    equal stamps, all are in order of arrival.
+    """
+    # Stamp and values of each scan; each attempt, and its kind.
+    scans: dict[object, tuple[int, dict[str, float]]] = {}
+    attempts: dict[object, tuple[Attempt, int | None]] = {}
+    sources: list[tuple[int, int, str]] = []
+    for number, write in enumerate(writes):
+        key: object = number if write.own_stamp_ns == KNOWN_BY_NOTHING else key_of(write)
+        stamp_ns = attempts[key][0].stamp_ns if key in attempts else write.stamp_ns
+        attempts[key] = Attempt(stamp_ns, write.status, write.status_detail), kind_of(write)
+        if isinstance(write, Scan) and write.readings:
+            values = scans.setdefault(key, (stamp_ns, {}))[1]
+            values.update((reading.name, reading.value) for reading in write.readings)
+        if write.source:
+            sources.append((stamp_ns, number, write.source))
+    if newest is not None:
+        _add_newest(newest, scans, attempts)
     sensors: dict[str, list[dict[str, Any]]] = {}
-    for scan in past.scans:
-        for reading in scan.readings:
-            value = reading.value if math.isfinite(reading.value) else None
-            sensors.setdefault(reading.name, []).append(
-                {"stamp": stamp(scan.stamp_ns), "value": value}
-            )
+    for stamp_ns, values in sorted(scans.values(), key=lambda scan: scan[0])[-count:]:
+        for name, value in sorted(values.items()):
+            entry = {"stamp": stamp(stamp_ns), "value": value if math.isfinite(value) else None}
+            sensors.setdefault(name, []).append(entry)
+    last = sorted(attempts.values(), key=lambda attempt: attempt[0].stamp_ns)[-count:]
     return {
         "tag_id": tag_id,
-        "source": past.source or None,
+        # Of the latest observation that names one.
+        "source": max(sources)[2] if sources else None,
         "sensors": [{"name": name, "values": values} for name, values in sensors.items()],
         "tries": [
             {
                 "stamp": stamp(attempt.stamp_ns),
-                "status": attempt.what.status,
-                "status_detail": attempt.what.detail,
-                "kind": attempt.kind,
+                "status": attempt.status,
+                "status_detail": attempt.detail,
+                "kind": kind,
             }
-            for attempt in past.attempts
+            for attempt, kind in last
         ],
     }
+
+
+def _add_newest(
+    tag: TagState,
+    scans: dict[object, tuple[int, dict[str, float]]],
+    attempts: dict[object, tuple[Attempt, int | None]],
+) -> None:
+    known = {(at, name, repr(value)) for at, own in scans.values() for name, value in own.items()}
+    for reading in tag.readings:
+        at_ns = reading.observed_at_ns
+        if at_ns is not None and (at_ns, reading.name, repr(reading.value)) not in known:
+            key = KIND_TAG_READING, at_ns, ""
+            scans.setdefault(key, (at_ns, {}))[1][reading.name] = reading.value
+    attempted = {attempt for attempt, _ in attempts.values()}
+    for attempt, kind in _attempts_of(tag):
+        if attempt not in attempted:
+            attempts[kind, attempt.stamp_ns, ""] = attempt, kind
+
+
+def _attempts_of(tag: TagState) -> list[tuple[Attempt, int | None]]:
+    """The attempts known from a state: the last one, and the last inspection that saw flowers.
+
+    With their kinds; None if unknown: a state does not hold the kind of a failed one.
+    """
+    last, attempts = tag.last_try, list[tuple[Attempt, int | None]]()
+    if tag.looked_at_ns is not None and (last is None or tag.looked_at_ns != last.stamp_ns):
+        attempts.append((Attempt(tag.looked_at_ns), KIND_FLOWER))
+    if last is not None:
+        kind = None
+        if any(reading.observed_at_ns == last.stamp_ns for reading in tag.readings):
+            kind = KIND_TAG_READING
+        elif last.stamp_ns == tag.looked_at_ns and last.status == STATUS_OK:
+            kind = KIND_FLOWER
+        attempts.append((last, kind))
+    return attempts
 
 
 # --- alarms and judgements ------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import { CATALOGUE, IN_FAHRENHEIT, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, causeWords, countsText, filtered, tagsText } from './arrange';
 import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import { inOrder, listOf } from './list';
-import type { Now } from './words';
+import { partsText, type Now } from './words';
 
 const isTag = (): boolean => false;
 const AT = 1_800_000_000_000;
@@ -52,12 +52,49 @@ test('many of one cause stand where the worst of them does', () => {
 test('a few of several causes: the worst first, whatever the cause', () => {
   const worst = alarm('worst', { reason: { sensor: 'humidity', verdict: 'critical' } });
   const mild = { verdict: 'stressed' } as const;
-  const items = active(cold(1), alarm('mild', { reason: mild }), worst, hot(1));
+  const items = active(cold(1), alarm('mild', { tag_id: '9', reason: mild }), worst, hot(1));
   const [block] = arranged(items, 'cause', CATALOGUE);
   expect(block?.items.map(({ alarm: { id } }) => id)).toEqual(items.map((it) => it.alarm.id));
   expect(items.map((it) => it.alarm.reason.verdict)).toEqual([
     ...['critical', 'critical', 'stressed', 'stressed'],
   ]);
+});
+
+const NBSP = '\u00a0';
+const damp = (tag_id: string) => [
+  alarm(`rh${tag_id}`, { tag_id, raised: 80, reason: { ...DAMP, value: 93, limit: 85 } }),
+  alarm(`vpd${tag_id}`, { tag_id, reason: { ...DAMP, sensor: 'vpd', value: 0.15, limit: 0.2 } }),
+];
+const DAMP = { sensor: 'humidity', verdict: 'stressed' } as const;
+
+test('a tag whose air is damp by several sensors has one cause; one sensor keeps its name', () => {
+  const named = (...alarms: Alarm[]) =>
+    arranged(active(...alarms), 'cause', CATALOGUE).map(({ cause, items }) => [
+      cause,
+      items.length,
+    ]);
+  expect(named(...damp('4'), cold(1))).toEqual([
+    [null, 1],
+    ['Air too damp', 2],
+  ]);
+  expect(named(...damp('4'), ...damp('5').slice(1))).toEqual([['Air too damp', 3]]);
+  const only = ['1', '2', '3', '4', '5'].flatMap((tag) => damp(tag).slice(0, 1));
+  expect(named(...only)).toEqual([['Humidity too high', 5]]);
+  // Dry by one sensor and damp by another is no spell of either.
+  const dry = alarm('dry', {
+    tag_id: '4',
+    reason: { ...DAMP, sensor: 'vpd', value: 1.5, limit: 1.3 },
+  });
+  expect(named(...damp('4').slice(0, 1), dry)).toEqual([[null, 2]]);
+  const list = listOf(damp('4'), NO_LOCAL_ALARMS, null, AT);
+  expect(filtered(list, 'too damp', CATALOGUE, isTag).active).toHaveLength(2);
+  const now = ({ id }: Alarm): Now => ({
+    ...{ kind: 'known', reason: null, trend: null },
+    ...(id === 'rh4' ? { value: 96, verdict: 'critical' } : { value: null, verdict: 'healthy' }),
+  });
+  expect(partsText(list.active, CATALOGUE, now)).toBe(
+    `VPD (in range), Humidity 96.0${NBSP}% (critical)`,
+  );
 });
 
 test('of one cause, each area stands by itself, and is found by its name', () => {
@@ -136,7 +173,7 @@ test.each([
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {
   const evil = alarm('a', { tag_id: '=1+1', raised: 0, worst: 4.2 });
-  const local = shelve(NO_LOCAL_ALARMS, { alarm: evil }, AT + 60_000, 'fan, off');
+  const local = shelve(NO_LOCAL_ALARMS, evil, AT + 60_000, 'fan, off');
   const list = listOf([evil, alarm('b', { cleared: 960 })], local, 1_000, AT);
   const [head, shelved, resolved] = alarmsCsv(list, IN_FAHRENHEIT, () => null)
     .slice(1)

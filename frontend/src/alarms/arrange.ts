@@ -1,7 +1,7 @@
 /** Views of the alarm list: filtered, sorted, grouped by cause and area, or as CSV. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
-import { isOfRange, nameOf, sideOf, VERDICTS } from '../domain/health';
+import { airOf, isOfRange, nameOf, sideOf, VERDICTS } from '../domain/health';
 import { groupedBy } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
@@ -18,7 +18,7 @@ export type Order = (typeof ORDERS)[number];
 /** Most tags named per cause. */
 const MOST_NAMED = 8;
 
-/** Consecutive alarms; with a cause, more than `MOST_LOOSE` that all share it. */
+/** Consecutive alarms; with a cause, those that share it: more than `MOST_LOOSE`, or several of one tag. */
 export interface Block<T extends Wrong = Item> {
   readonly key: string;
   readonly cause: string | null;
@@ -34,11 +34,12 @@ export function filtered(
 ): AlarmList {
   const isFound = finder(text, isTag);
   if (!isFound) return list;
-  const has = ({ alarm }: Item): boolean =>
-    isFound(
-      alarm.tag_id,
-      `${nameText(alarm, sensors)} ${causeText(alarm, sensors)} ${S.health[alarm.reason.verdict]}`.toLowerCase(),
-    );
+  const has = ({ alarm }: Item): boolean => {
+    const air = airOf(alarm.reason);
+    const names = [nameText(alarm, sensors), sharedText([{ alarm }], sensors)];
+    const words = [...names, air ? S.airCause[air] : '', S.health[alarm.reason.verdict]];
+    return isFound(alarm.tag_id, words.join(' ').toLowerCase());
+  };
   return inEach(list, (items) => items.filter(has));
 }
 
@@ -55,11 +56,11 @@ export function arranged(
         : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
     return [{ key: order, cause: null, items: [...items].sort(by) }];
   }
-  return byCause(items, sensors);
+  return blocksOf(items, sensors);
 }
 
 /** Groups items that share a cause into one block, at the place of the worst one. */
-export function byCause<T extends Wrong>(
+export function blocksOf<T extends Wrong>(
   items: readonly T[],
   sensors: Catalogue,
 ): readonly Block<T>[] {
@@ -67,20 +68,29 @@ export function byCause<T extends Wrong>(
   const blocks: (Block<T> & { readonly items: T[] })[] = [];
   for (const item of items) {
     const key = causeOf(item.alarm, sensors);
-    const own = causes.get(key) ?? [];
+    const own = causes.get(key) ?? [item];
     const before = blocks.at(-1);
-    if (own.length > MOST_LOOSE) {
-      if (own[0] === item)
-        blocks.push({ key, cause: causeText(item.alarm, sensors), items: [...own] });
+    if (own.length > MOST_LOOSE || own.length > tagsOf(own).length) {
+      if (own[0] === item) blocks.push({ key, cause: sharedText(own, sensors), items: [...own] });
     } else if (before?.cause === null) before.items.push(item);
     else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
   }
   return blocks;
 }
 
-function causeText(alarm: Wrong['alarm'], sensors: Catalogue): string {
+/** The tags of alarms, each once. */
+export const tagsOf = (items: readonly Wrong[]): readonly string[] => [
+  ...new Set(items.map(({ alarm }) => alarm.tag_id)),
+];
+
+/** The cause of alarms that share it, with its area; damp or dry air, if several sensors tell of it. */
+function sharedText(items: readonly [Wrong, ...Wrong[]], sensors: Catalogue): string {
+  const [{ alarm }] = items;
   const area = sensors.areaOf(alarm.tag_id);
-  return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, sensors)].join(' · ');
+  const air = airOf(alarm.reason);
+  const isOne = new Set(items.map((item) => item.alarm.reason.sensor)).size === 1;
+  const cause = air && !isOne ? S.airCause[air] : causeWords(alarm, sensors);
+  return [...(area === '' ? [] : [shown(area, 32)]), cause].join(' · ');
 }
 
 export function causeWords(alarm: Pick<Alarm, 'reason'>, sensors: Catalogue): string {

@@ -3,10 +3,12 @@ import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectLatestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
-import { isBack, todoText, VERDICTS } from '../domain/health';
+import { airOf, isBack, todoText, VERDICTS } from '../domain/health';
+import { groupedBy } from '../domain/memo';
 import { isReceivingNow, selectLatestTag } from '../store/moment';
-import { inOrder, type Item } from './list';
-import { alarmText, nowOf, reasonNow, type Now } from './words';
+import { S } from '../strings';
+import { causeOf, inOrder, type Item } from './list';
+import { alarmText, nowOf, partsText, reasonNow, whereText, type Now } from './words';
 
 /** From when on alarms are known; null: not reported. */
 export const selectKnownSince = ({ twin }: AppState): WireTime | null => twin.alarms?.since ?? null;
@@ -45,6 +47,26 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
 export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
   inOrder(items, ({ alarm }) => reasonIn(state, alarm));
 
-/** An alarm in one line, with its current value. */
-export const textNow = (state: AppState, alarm: Alarm): string =>
-  alarmText(alarm, selectCatalogue(state), selectNow(state, alarm));
+/** Most causes named in one message; the list has the rest. */
+const MOST_NAMED = 3;
+
+/** Alarms in one message with their current values, those of one cause at a tag together. */
+export function severalNow(
+  state: AppState,
+  items: readonly Item[],
+  say: (texts: readonly string[], more: number) => string,
+  most = MOST_NAMED,
+): string {
+  const sensors = selectCatalogue(state);
+  const current = (alarm: Alarm): Now | null => selectNow(state, alarm);
+  const causes = groupedBy(items, ({ alarm }) => `${alarm.tag_id}|${causeOf(alarm, sensors)}`);
+  const named = [...causes.values()].slice(0, most);
+  const texts = named.map((own) => {
+    const [{ alarm }] = own;
+    const air = airOf(alarm.reason);
+    if (!air || own.length === 1) return alarmText(alarm, sensors, current(alarm));
+    const what = S.alarmWhat(S.airCause[air], partsText(own, sensors, current));
+    return S.alarmWhat(whereText(alarm), what);
+  });
+  return say(texts, items.length - named.flat().length);
+}

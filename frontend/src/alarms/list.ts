@@ -1,6 +1,6 @@
 /** The alarm list: active, shelved and resolved alarms, each sorted. Pure. */
 import type { Alarm, HealthReason } from '../contract/types';
-import { isOfRange, severity, sideOf } from '../domain/health';
+import { airOf, isOfRange, severity, sideOf } from '../domain/health';
 import { withParts } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
@@ -108,12 +108,12 @@ export const inOrder = (
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
-/** Key of a cause: kind, sensor, side and area, whatever the limit. */
-export const causeOf = ({ reason, tag_id }: Wrong['alarm'], sensors: Catalogue): string =>
-  [
-    ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
-    sensors.areaOf(tag_id),
-  ].join('|');
+/** Key of a cause: damp or dry air, else kind, sensor and side, whatever the limit; and area. */
+export function causeOf({ reason, tag_id }: Wrong['alarm'], sensors: Catalogue): string {
+  const side = isOfRange(reason) ? sideOf(reason) : '';
+  const cause = airOf(reason) ?? `${reason.kind}|${reason.sensor}|${side}`;
+  return `${cause}|${sensors.areaOf(tag_id)}`;
+}
 
 /** The alarm raised first. */
 export const oldestOf = (items: readonly Item[]): Alarm | undefined =>

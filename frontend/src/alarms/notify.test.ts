@@ -317,7 +317,7 @@ describe('notification', () => {
     expect([own.get().notify, notifyState.get()]).toEqual([false, 'insecure']);
   });
 
-  test('a browser that refuses the constructor is reported', async () => {
+  test('a phone shows it by the service worker; a browser that cannot at all is reported', async () => {
     browser('granted');
     start(startNotify);
     await setNotify(true);
@@ -328,7 +328,18 @@ describe('notification', () => {
       { permission: 'granted' },
     );
     vi.stubGlobal('Notification', Failing);
+    const showNotification = vi.fn();
+    const getRegistration = () => Promise.resolve({ showNotification });
+    vi.stubGlobal('navigator', { serviceWorker: { getRegistration } });
     reportAlarms(warm);
-    expect([own.get().notify, notifyState.get()]).toEqual([false, 'none']);
+    await vi.waitFor(() => {
+      expect(showNotification.mock.lastCall?.[0]).toBe('1 new alarm');
+    });
+    expect([own.get().notify, notifyState.get()]).toEqual([true, 'granted']);
+    vi.stubGlobal('navigator', {});
+    reportAlarms(warm, cold);
+    await vi.waitFor(() => {
+      expect([own.get().notify, notifyState.get()]).toEqual([false, 'none']);
+    });
   });
 });

@@ -10,9 +10,8 @@ import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, updateNotifySettings } from './own';
-import { textNow, worstNow } from './latest';
+import { severalNow, worstNow } from './latest';
 import { alarmList, onNews } from './watch';
-import { severalText } from './words';
 
 /**
  * The browser's permission. "prompt": it will ask the operator. "insecure": it allows notifications only
@@ -29,6 +28,9 @@ function stateNow(): NotifyState {
 
 export const notifyState = createStore<NotifyState>('none');
 
+/** Whether the bridge reaches this browser while the page is closed, by Web Push. */
+export const isPushed = createStore(false);
+
 /** Turns notifications on or off, on a click: only then may the page ask for permission. */
 export async function setNotify(isRequested: boolean): Promise<void> {
   notifyState.set(stateNow());
@@ -38,32 +40,32 @@ export async function setNotify(isRequested: boolean): Promise<void> {
   }
   const isOn = isRequested && notifyState.get() === 'granted';
   updateNotifySettings({ notify: isOn });
-  // In addition: an open page notifies without Web Push.
-  await setPush(isOn).catch(() => {
-    // No push service, or the bridge is unreachable: the page still notifies.
-  });
+  await tryPush(isOn);
+}
+
+/** In addition: without a push service, or if the bridge is unreachable, an open page still notifies. */
+async function tryPush(isRequested: boolean): Promise<void> {
+  isPushed.set(await setPush(isRequested).catch(() => false));
 }
 
 let last: Notification | null = null;
 
 /** Shows one notification for all new alarms, shared by all tabs; a later one replaces it. */
-function show(raised: readonly Item[]): void {
+async function show(raised: readonly Item[]): Promise<void> {
   const [first] = raised;
   if (!first) return;
-  const body = severalText(
-    raised.map(({ alarm }) => alarm),
-    (alarm) => textNow(store.get(), alarm),
-    S.alarmsRaised,
-  );
+  const body = severalNow(store.get(), raised, S.alarmsRaised);
+  const origin = selectOrigin(store.get());
+  const several = S.alarmNotifyTitle(raised.length);
+  const title = origin === null ? several : `${S.origin[origin]}: ${several}`;
+  // New alarms get a new tag: browsers replace the same tag silently.
+  const options = {
+    body,
+    tag: `lupin-twin.alarms ${first.alarm.id} ${first.alarm.reason.verdict}`,
+  };
   try {
-    const origin = selectOrigin(store.get());
-    const title = S.alarmNotifyTitle(raised.length);
     last?.close();
-    const shown = new Notification(origin === null ? title : `${S.origin[origin]}: ${title}`, {
-      body,
-      // New alarms get a new tag: browsers replace the same tag silently.
-      tag: `lupin-twin.alarms ${first.alarm.id} ${first.alarm.reason.verdict}`,
-    });
+    const shown = new Notification(title, options);
     last = shown;
     shown.onclick = () => {
       window.focus();
@@ -71,7 +73,12 @@ function show(raised: readonly Item[]): void {
       shown.close();
     };
   } catch {
-    // Some browsers refuse the constructor to pages, and throw only here.
+    // Phones leave this to the service worker, and throw only here.
+    const worker = await registration().catch(() => undefined);
+    if (worker) {
+      await worker.showNotification(title, options);
+      return;
+    }
     notifyState.set('none');
     updateNotifySettings({ notify: false });
   }
@@ -80,10 +87,12 @@ function show(raised: readonly Item[]): void {
 /** Notifies of new alarms if enabled and the page is not in use; returns a stop function. */
 export function startNotify(): () => void {
   notifyState.set(stateNow());
+  // Anew on each visit: the browser, its push service or the bridge may have forgotten it.
+  if (own.get().notify && notifyState.get() === 'granted') void tryPush(true);
   return onNews(({ raised }) => {
     notifyState.set(stateNow());
     const isLooking = document.visibilityState === 'visible' && document.hasFocus();
-    if (own.get().notify && notifyState.get() === 'granted' && !isLooking) show(raised);
+    if (own.get().notify && notifyState.get() === 'granted' && !isLooking) void show(raised);
   });
 }
 
@@ -91,21 +100,27 @@ interface Key {
   public_key: string | null;
 }
 
-/** Subscribes this browser to the bridge's Web Push, or unsubscribes it; without Web Push, does nothing. */
-export async function setPush(isRequested: boolean): Promise<void> {
-  if (!('serviceWorker' in navigator)) return;
-  const registration = await navigator.serviceWorker.getRegistration();
-  if (!registration || !('pushManager' in registration)) return;
-  const { pushManager } = registration;
+const registration = async (): Promise<ServiceWorkerRegistration | undefined> =>
+  'serviceWorker' in navigator ? navigator.serviceWorker.getRegistration() : undefined;
+
+/**
+ * Subscribes this browser to the bridge's Web Push, or unsubscribes it; without Web Push, does nothing.
+ * Returns whether it is subscribed.
+ */
+export async function setPush(isRequested: boolean): Promise<boolean> {
+  const worker = await registration();
+  if (!worker || !('pushManager' in worker)) return false;
+  const { pushManager } = worker;
   const known = await pushManager.getSubscription();
   if (!isRequested) {
-    if (!known) return;
-    await postPush({ endpoint: known.endpoint });
+    if (!known) return false;
+    // First, as it needs no bridge: the bridge forgets a browser that its push service does not know.
     await known.unsubscribe();
-    return;
+    await postPush({ endpoint: known.endpoint });
+    return false;
   }
   const { public_key: key } = (await (await request('api/push', {})).json()) as Key;
-  if (key === null) return;
+  if (key === null) return false;
   const options = { userVisibleOnly: true, applicationServerKey: key };
   let subscription;
   try {
@@ -117,6 +132,7 @@ export async function setPush(isRequested: boolean): Promise<void> {
     subscription = await pushManager.subscribe(options);
   }
   await postPush(subscription.toJSON());
+  return true;
 }
 
 /** White text on these colours is legible on any tab bar, which does not follow our theme. */

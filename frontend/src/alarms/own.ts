@@ -81,7 +81,7 @@ export const acknowledge = (
 
 export const shelve = (
   local: LocalAlarms,
-  { alarm }: WithAlarm,
+  alarm: Alarm,
   until: number,
   reason: string,
 ): LocalAlarms => ({
@@ -206,8 +206,8 @@ export const unacknowledgeAlarm = (alarm: Alarm): void => {
   change('unacknowledge', 1, { ...local, acknowledged: without(local.acknowledged, alarm.id) });
 };
 
-export const shelveAlarm = (item: WithAlarm, minutes: number, reason: string): void => {
-  change('shelve', 1, shelve(own.get(), item, timeOfDay() + minutes * 60_000, reason));
+export const shelveAlarm = (alarm: Alarm, minutes: number, reason: string): void => {
+  change('shelve', 1, shelve(own.get(), alarm, timeOfDay() + minutes * 60_000, reason));
 };
 
 export const unshelveAlarm = (alarm: Alarm): void => {

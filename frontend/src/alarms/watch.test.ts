@@ -96,7 +96,7 @@ test('a worse alarm is announced again, acknowledged or not', () => {
 test('acknowledgements survive a reload, and own actions are not announced', () => {
   reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   acknowledgeAlarms([item('a')]);
-  shelveAlarm(item('b'), 15, 'x');
+  shelveAlarm(item('b').alarm, 15, 'x');
   expect(ids()).toEqual([]);
   unshelveAlarm(item('b').alarm);
   expect(ids()).toEqual(['b']);
@@ -123,7 +123,7 @@ test('acknowledged long ago, a lasting alarm stays so while the list is not ther
 
 test('a shelved alarm returns when its time is over, and is announced', () => {
   reportAlarms(alarm('a'));
-  shelveAlarm(item('a'), 15, 'x');
+  shelveAlarm(item('a').alarm, 15, 'x');
   expect(alarmList.get().shelved).toHaveLength(1);
   vi.advanceTimersByTime(15 * 60_000 - 1);
   expect(ids()).toEqual([]);
@@ -141,7 +141,7 @@ test('each action can be undone for a while; another tab’s word ends that', ()
   undo();
   expect([ids(), lastAction.get()]).toEqual([['a', 'b'], null]);
   acknowledgeAlarms([item('a')]);
-  shelveAlarm(item('b'), 15, 'x');
+  shelveAlarm(item('b').alarm, 15, 'x');
   expect(last()).toEqual(['shelve', 1]);
   undo();
   // Only the last action is undone; earlier ones stand.
@@ -150,14 +150,14 @@ test('each action can be undone for a while; another tab’s word ends that', ()
   expect(ids()).toEqual(['a', 'b']);
   undo();
   expect(ids()).toEqual(['b']);
-  shelveAlarm(item('b'), 15, 'x');
+  shelveAlarm(item('b').alarm, 15, 'x');
   unshelveAlarm(item('b').alarm);
   undo();
   expect(ids()).toEqual([]);
   unshelveAlarm(item('b').alarm);
   vi.advanceTimersByTime(UNDO_MS);
   expect(lastAction.get()).toBeNull();
-  shelveAlarm(item('b'), 15, 'x');
+  shelveAlarm(item('b').alarm, 15, 'x');
   window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
   expect(lastAction.get()).toBeNull();
 });

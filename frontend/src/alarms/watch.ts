@@ -20,8 +20,7 @@ import {
   type Item,
   type News,
 } from './list';
-import { textNow } from './latest';
-import { severalText } from './words';
+import { severalNow } from './latest';
 
 /** The current alarms. */
 export const alarmList = createStore<AlarmList>(EMPTY_LIST);
@@ -148,16 +147,7 @@ function newsText({ raised, cleared }: News): string {
   const text = (
     items: readonly Item[],
     say: (texts: readonly string[], more: number) => string,
-  ): string[] =>
-    items.length === 0
-      ? []
-      : [
-          severalText(
-            items.map(({ alarm }) => alarm),
-            (alarm) => textNow(store.get(), alarm),
-            say,
-          ),
-        ];
+  ): string[] => (items.length === 0 ? [] : [severalNow(store.get(), items, say)]);
   return [...text(raised, S.alarmsRaised), ...text(cleared, S.alarmsCleared)].join('. ');
 }
 

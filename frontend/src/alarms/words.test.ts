@@ -1,6 +1,6 @@
 import { expect, test, vi } from 'vitest';
 
-import type { Alarm, Verdict } from '../contract/types';
+import type { Verdict } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { held, reason } from '../testing/health';
 import { S } from '../strings';
@@ -10,7 +10,6 @@ import {
   lengthOf,
   nameText,
   resolvedText,
-  severalText,
   spanText,
   sinceText,
   unknownText,
@@ -180,13 +179,4 @@ test('since when; for how long only if it began today, in hours from ten on', ()
   expect(`${lengthOf(over)}, ${resolvedText(over, NOON + 1_500)}`).toBe(
     '10\u00a0min, resolved 12:10',
   );
-});
-
-test('of several the first are named', () => {
-  const text = (each: Alarm): string => alarmText(each, C, CRITICAL);
-  const four = ['1', '2', '3', '4'].map((tag_id) => alarm(tag_id, { tag_id }));
-  expect(severalText(four.slice(0, 1), text, S.alarmsRaised)).toMatch(
-    /^New: Tag 1: [^;]*critical\)$/,
-  );
-  expect(severalText(four, text, S.alarmsRaised)).toMatch(/Tag 3: [^;]* and 1 more$/);
 });

@@ -2,7 +2,15 @@
 import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import { ageText, beyondLimitText, minuteText, readingText } from '../domain/format';
-import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
+import {
+  beyondText,
+  isOfRange,
+  nameOf,
+  ratedText,
+  reasonText,
+  sideOf,
+  todoText,
+} from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import {
@@ -14,11 +22,10 @@ import {
   type When,
 } from '../domain/time';
 import { S } from '../strings';
+import type { Item } from './list';
 
 /** Longest tag name, characters: names come from the robot. */
 const LONGEST_NAME = 24;
-/** Most alarms named in one message; the list has the rest. */
-const MOST_NAMED = 3;
 const TEN_HOURS_S = 36_000;
 
 export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
@@ -92,15 +99,27 @@ export function alarmText(alarm: Alarm, sensors: Catalogue, now: Now | null): st
   const texts = [
     what,
     // Text without a value already says how it is.
-    isKnown && nowText !== null && now.value !== null ? rated(nowText, now.verdict) : nowText,
-    worst === null ? null : rated(worst, alarm.reason.verdict),
+    isKnown && nowText !== null && now.value !== null ? ratedText(nowText, now.verdict) : nowText,
+    worst === null ? null : ratedText(worst, alarm.reason.verdict),
   ];
   return S.alarmWhat(whereText(alarm), texts.filter((text) => text !== null).join(', '));
 }
 
-/** Appends a critical or healthy verdict; no suffix means out of range. */
-const rated = (text: string, verdict: Verdict): string =>
-  verdict === 'critical' || verdict === 'healthy' ? `${text} (${S.alarmStatus[verdict]})` : text;
+/** The sensors of a tag's alarms that share a cause, with their values now, if known. */
+export function partsText(
+  items: readonly Item[],
+  sensors: Catalogue,
+  nowOf: (alarm: Alarm) => Now | null,
+): string {
+  const texts = items.map(({ alarm }) => {
+    const sensor = sensors.named(alarm.reason.sensor);
+    const now = nowOf(alarm);
+    if (now?.kind !== 'known') return nameOf(sensor);
+    const reading = now.value === null ? '' : ` ${readingText(sensor, now.value)}`;
+    return ratedText(`${nameOf(sensor)}${reading}`, now.verdict);
+  });
+  return [...new Set(texts)].join(', ');
+}
 
 /** Says that the value now is unknown, and gives the last known one. */
 export function unknownText(
@@ -177,16 +196,6 @@ const isSameDay = (a: number, b: number): boolean =>
 const dayOf = (at: number): string => new Date(at * 1000).toDateString();
 
 const clockOf = (at: number): string => minuteText(at * 1000);
-
-/** Some alarms in one message; `text` words a single one. */
-export function severalText(
-  alarms: readonly Alarm[],
-  text: (alarm: Alarm) => string,
-  say: (texts: readonly string[], more: number) => string,
-): string {
-  const texts = alarms.slice(0, MOST_NAMED).map(text);
-  return say(texts, alarms.length - texts.length);
-}
 
 export type Now =
   | {

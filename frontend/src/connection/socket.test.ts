@@ -171,8 +171,15 @@ test('a server that requires a token leads to its sign-in page, which says why',
   location.hash = '#at=5&tag=7';
   await signInIfRequired(leave);
   location.hash = '';
+  // A proxy that signs people in, as Authelia does.
+  vi.stubGlobal('fetch', (_: URL, { redirect }: RequestInit) =>
+    redirect === 'manual'
+      ? Promise.resolve({ type: 'opaqueredirect', status: 0 })
+      : Promise.reject(new TypeError('Failed to fetch')),
+  );
+  await signInIfRequired(leave);
   const left = leave.mock.calls.map(([url]) => url.pathname + url.hash);
-  expect(left).toEqual(['/signin#ended', '/signin#ended&at=5&tag=7']);
+  expect(left).toEqual(['/signin#ended', '/signin#ended&at=5&tag=7', '/signin#ended']);
 });
 
 test.each([200, 403, 503])('a server that answers %i keeps the page', async (status) => {

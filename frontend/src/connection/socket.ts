@@ -119,10 +119,12 @@ export function connect(url: string, handlers: ConnectionHandlers) {
  * asks over HTTP; a server that is merely down changes nothing.
  */
 export async function signInIfRequired(leave: (url: URL) => void = goTo): Promise<void> {
-  const answer = await fetch(route('readyz'), { cache: 'no-store' }).catch(() => null);
+  // A proxy leads to its own sign-in page on another origin, which only the whole page can follow.
+  const options = { cache: 'no-store', redirect: 'manual' } as const;
+  const answer = await fetch(route('readyz'), options).catch(() => null);
+  if (answer?.status !== 401 && answer?.type !== 'opaqueredirect') return;
   // The view in the fragment goes along, and comes back.
-  const place = location.hash.replace('#', '&');
-  if (answer?.status === 401) leave(new URL(`#ended${place}`, route('signin')));
+  leave(new URL(`#ended${location.hash.replace('#', '&')}`, route('signin')));
 }
 
 function goTo(url: URL): void {

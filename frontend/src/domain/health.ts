@@ -2,7 +2,7 @@
 import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
 import { S } from '../strings';
 import { ageText, beyondLimitText, readingText, valueText } from './format';
-import type { Shared } from './memo';
+import { groupedBy, type Shared } from './memo';
 import type { Catalogue, Sensor } from './sensors';
 import { shown } from './text';
 import type { Tag } from './twin';
@@ -30,17 +30,20 @@ const SILENT: HealthReason = {
 
 /**
  * The greenhouse as judged. If `isReceiving` is false, its own verdict is unknown, whatever came last;
- * the tags' verdicts stay, beside the age of their readings.
+ * the tags' verdicts stay, beside the age of their readings. Without an age, that all was well says nothing.
  */
 export function houseHealth(
   tags: readonly Tag[],
   judgement: Judgement | null,
   isReceiving: boolean,
+  areAged = true,
 ) {
   const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
   const byTag = new Map<string, TagHealth>();
-  for (const { id } of tags) {
-    const health = judgement?.tags[id] ?? NOT_JUDGED;
+  for (const { id, scannedAt } of tags) {
+    const judged = judgement?.tags[id] ?? NOT_JUDGED;
+    const isDated = isReceiving || (areAged && scannedAt !== 'unknown');
+    const health = isDated || judged.verdict !== 'healthy' ? judged : NOT_JUDGED;
     byTag.set(id, health);
     counts[health.verdict] += 1;
   }
@@ -104,6 +107,26 @@ export const sideOf = ({
 }: Pick<OfRange, 'value' | 'limit' | 'release'>): 'below' | 'above' =>
   value < (release ?? limit) ? 'below' : 'above';
 
+/** On which side of their ranges these tell of damp air; all follow from the same two readings. */
+const DAMP: Partial<Record<string, 'below' | 'above'>> = {
+  humidity: 'above',
+  vpd: 'below',
+  condensation_margin: 'below',
+};
+
+/** Whether a reason tells of damp or dry air: of a tag, all such reasons have one cause. Null: neither. */
+export function airOf(reason: HealthReason): 'damp' | 'dry' | null {
+  const damp = isOfRange(reason) && DAMP[reason.sensor];
+  return !damp ? null : sideOf(reason) === damp ? 'damp' : 'dry';
+}
+
+/** A tag's reasons by their cause, in the same order. */
+export const byCause = (
+  reasons: readonly HealthReason[],
+): readonly (readonly [HealthReason, ...HealthReason[]])[] => [
+  ...groupedBy(reasons, (reason) => airOf(reason) ?? `${reason.kind} ${reason.sensor}`).values(),
+];
+
 /** The previous object if the content is the same, so that derived values stay cached. */
 export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {
   const isSame =
@@ -119,6 +142,10 @@ const LONG_NAME = 20;
 /** A sensor's name in sentences and headings. */
 export const nameOf = ({ label }: Sensor): string =>
   shown(label.length > LONG_NAME ? S.sensorShort(label) : label, LONGEST_NAME);
+
+/** Appends a critical or healthy verdict; no suffix means out of range. */
+export const ratedText = (text: string, verdict: Verdict): string =>
+  verdict === 'critical' || verdict === 'healthy' ? `${text} (${S.alarmStatus[verdict]})` : text;
 
 /**
  * A reason as a sentence without its full stop. `age` is that of the observation behind it, seconds;
@@ -138,14 +165,13 @@ export function reasonText(
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
     const reading = beyondLimitText(sensor, reason.value, edge);
-    const held = heldText(reason, (each) => valueText(sensor, each));
     // "Just below 350" names the limit itself.
-    const isNear = !held && reading !== readingText(sensor, reason.value);
+    const isNear = reading !== readingText(sensor, reason.value);
+    const held = heldText(reason, (each) => (isNear ? null : valueText(sensor, each)));
     const side = S.reasons.sides[sideOf(reason)];
-    const limit = held ?? `${side} ${valueText(sensor, reason.limit)}`;
-    const isRated = reason.verdict === 'critical' && !isMarked && !held;
-    const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
-    return `${label} ${reading}${ago}${isNear ? '' : `, ${limit}`}${rated}`;
+    const limit = held ?? (isNear ? null : `${side} ${valueText(sensor, reason.limit)}`);
+    const text = `${label} ${reading}${ago}${limit === null ? '' : `, ${limit}`}`;
+    return isMarked || held ? text : ratedText(text, reason.verdict);
   }
   switch (kind) {
     case 'range':
@@ -186,7 +212,7 @@ export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
 /** For a value that is back in its range, what it must pass; null: it is beyond its limit. */
-const heldText = (reason: OfRange, text: (value: number) => string): string | null => {
+const heldText = (reason: OfRange, text: (value: number) => string | null): string | null => {
   const { release = null, verdict } = reason;
   if (release === null) return null;
   const isBelow = sideOf(reason) === 'above';
@@ -205,10 +231,12 @@ export function beyondText(sensors: Catalogue, reason: OfRange): string {
 /** What to do about it; for what is healthy again, what its alarm still waits for. */
 export function todoText(reason: HealthReason): string {
   if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
-  const { sensors, ...kinds } = S.todo;
+  const { sensors, air, ...kinds } = S.todo;
   if (isBack(reason)) return S.todo.watch;
   // Its last reading was in range, and is too old now.
   if (isOfRange(reason) && reason.verdict === 'unknown') return S.todo.old;
+  const which = airOf(reason);
+  if (which) return air[which];
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }
@@ -216,8 +244,32 @@ export function todoText(reason: HealthReason): string {
   return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
 }
 
-export const reasonsText = (sensors: Catalogue, reasons: readonly HealthReason[]): string =>
-  reasons.map((reason) => reasonText(sensors, reason, null)).join('; ');
+export const reasonsText = (
+  sensors: Catalogue,
+  reasons: readonly HealthReason[],
+  age: number | null = null,
+  isMarked = false,
+): string => reasons.map((reason) => reasonText(sensors, reason, age, isMarked)).join('; ');
+
+/** A tag's reasons of one cause (`byCause`) as one: its name, and all its values. */
+export function causeText(
+  sensors: Catalogue,
+  reasons: readonly HealthReason[],
+  age: number | null,
+  isMarked: boolean,
+): string {
+  const air = reasons.map(airOf)[0];
+  if (!air || reasons.length < 2 || reasons.every(isBack)) {
+    return reasonsText(sensors, reasons, age, isMarked);
+  }
+  const values = reasons.map(({ sensor: name, value, verdict }) => {
+    const sensor = sensors.named(name);
+    const reading = `${nameOf(sensor)} ${readingText(sensor, value ?? NaN)}`;
+    return isMarked ? reading : ratedText(reading, verdict);
+  });
+  const ago = age === null ? '' : ` (${S.agoSuffix(ageText(age))})`;
+  return `${S.alarmWhat(S.airCause[air], values.join(', '))}${ago}`;
+}
 
 /** The outcome of an attempt, by the status of its observation (lupin_msgs/Observation). */
 type AttemptOutcome = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';

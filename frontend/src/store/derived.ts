@@ -44,8 +44,15 @@ import { fixedRange, type Sort, type ViewState } from './view';
 const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
 
-export const selectHealth = (state: AppState): HouseHealth =>
-  healthShown(selectTags(state), selectShown(state).health, selectIsReceiving(state));
+export function selectHealth(state: AppState): HouseHealth {
+  const { health, ageing } = selectShown(state);
+  return healthShown(
+    selectTags(state),
+    health,
+    selectIsReceiving(state),
+    ageing.kind !== 'unknown',
+  );
+}
 
 /** The current health, whatever moment is shown; null before the first state. */
 export function selectLatestHealth(state: AppState): HouseHealth | null {

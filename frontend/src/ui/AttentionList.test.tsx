@@ -110,7 +110,7 @@ test('if all is shelved, or the robot stands still, it does not say that nothing
   act(() => {
     const pestAlarm = alarm('a', { tag_id: 'bug', reason: pest });
     reportAlarms(pestAlarm);
-    shelveAlarm({ alarm: pestAlarm }, 15, 'treated');
+    shelveAlarm(pestAlarm, 15, 'treated');
   });
   expect(ids()).toEqual([]);
   expect(screen.queryByRole('heading')).toBeNull();

@@ -1,9 +1,9 @@
 import { useRef, type CSSProperties, type JSX } from 'react';
 
-import { byCause, tagsText } from '../alarms/arrange';
+import { blocksOf, tagsText } from '../alarms/arrange';
 import { timeOfDay } from '../clock';
 import { minuteText, shortAgeText } from '../domain/format';
-import { isBad, isSilent, severity, todoText, type HouseHealth } from '../domain/health';
+import { byCause, isBad, isSilent, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -15,7 +15,7 @@ import { useTicking } from '../widgets/useNow';
 import { restOf, restText, selectIsCurrent, useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
 import { HealthShape } from './HealthMark';
-import { Reasons, useReasonText } from './Reasons';
+import { Reasons, useCauseText } from './Reasons';
 
 /** Most lines that a wall screen can hold. */
 const MOST_LINES = 40;
@@ -72,7 +72,7 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
     const id = `${own.tagId} ${todoText(reason)}`;
     return { own, alarm: { id, tag_id: own.tagId, reason } };
   });
-  return byCause(wrong, sensors).flatMap(({ key, cause, items }): Line[] =>
+  return blocksOf(wrong, sensors).flatMap(({ key, cause, items }): Line[] =>
     cause === null
       ? items.map(({ own, alarm }) => ({ key: alarm.id, cause, tags: [own] }))
       : [{ key, cause, tags: items.map(({ own }) => own) }],
@@ -83,11 +83,15 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
 function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.Element {
   const badness = ({ reasons: [reason] }: Urgent): number =>
     severity({ verdict: reason.verdict, reasons: [reason] });
-  const { tagId, reasons } = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
+  const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
+  const { tagId, reasons } = worst;
   const [reason] = reasons;
   const { verdict } = reason;
-  const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true, tagId));
-  const since = useSince(tagId, reason);
+  const why = S.healthDriver(
+    shown(tagId, 16),
+    useCauseText(byCause(reasons)[0] ?? [], true, tagId),
+  );
+  const since = useSince(worst);
   const isCurrent = useApp(selectIsCurrent);
   const isOne = cause === null;
   const facts = isOne ? [since] : [why, since, tagsText(tags.map((each) => each.tagId))];

@@ -2,11 +2,13 @@ import { Fragment, useMemo, type JSX } from 'react';
 
 import { selectKnownSince } from '../alarms/latest';
 import { sinceText } from '../alarms/words';
-import { alarmOf, isAwaited, type Item } from '../alarms/list';
+import { alarmOf, isAwaited, oldestOf, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason, Verdict } from '../contract/types';
 import {
+  airOf,
+  byCause,
   type HouseHealth,
   isBack,
   isBad,
@@ -31,7 +33,7 @@ import {
 } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
-import { selectAreAlarmsKnown, useReasonText } from './Reasons';
+import { selectAreAlarmsKnown, useCauseText } from './Reasons';
 
 /** Tags listed beside the map; the table has the rest. */
 const MOST_TAGS = 2;
@@ -43,7 +45,7 @@ export interface Urgent {
   readonly tagId: string;
   /** All with this task, shelved ones excluded; the first is the most severe. */
   readonly reasons: readonly [HealthReason, ...HealthReason[]];
-  /** Whether the first reason's alarm is acknowledged. */
+  /** Whether the alarms of all are acknowledged. */
   readonly isAcknowledged: boolean;
 }
 
@@ -55,6 +57,7 @@ export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const isNow = useApp((state) => selectShown(state).moment === null);
+  const isStarting = useApp(({ twin }) => twin.alarms?.source === 'starting');
   const alarms = useSelected(alarmList);
   return useMemo(() => {
     const acknowledged = alarms.active.filter((it) => it.isAcknowledged);
@@ -65,23 +68,25 @@ export function useUrgent(): readonly Urgent[] {
         const rank = (reason: HealthReason): number => {
           const own = reason.verdict;
           if (reason.kind === 'old' || !(isBad(own) || own === verdict)) return 0;
-          // A single failed scan is ordinary.
-          if (isNow && reason.kind === 'scan_failed' && !has(alarms.active, id, reason)) return 0;
+          // A single failed scan is ordinary; while recorded data is being read, it may be one of many.
+          const isSingle = isNow && !isStarting && !has(alarms.active, id, reason);
+          if (reason.kind === 'scan_failed' && isSingle) return 0;
           const judged = { verdict: isBack(reason) ? 'healthy' : own, reasons: [reason] };
           return severity(judged, has(acknowledged, id, reason));
         };
         const open = reasons
           .filter((reason) => rank(reason) > 0 && !has(alarms.shelved, id, reason))
           .sort((a, b) => rank(b) - rank(a));
-        return [...groupedBy(open, todoText).values()].map(([first, ...rest]) => ({
+        const tasks = groupedBy(open, (reason) => airOf(reason) ?? todoText(reason));
+        return [...tasks.values()].map((own) => ({
           tagId: id,
-          reasons: [first, ...rest] as const,
-          isAcknowledged: has(acknowledged, id, first),
-          rank: rank(first),
+          reasons: own,
+          isAcknowledged: own.every((reason) => has(acknowledged, id, reason)),
+          rank: rank(own[0]),
         }));
       })
       .sort((a, b) => b.rank - a.rank);
-  }, [tags, health, isNow, alarms]);
+  }, [tags, health, isNow, isStarting, alarms]);
 }
 
 /** Whether the tasks are those of now: what to do about past or last known values is no instruction. */
@@ -89,18 +94,19 @@ export const selectIsCurrent = (state: AppState): boolean =>
   selectShown(state).moment === null && !isSilent(selectHealth(state));
 
 /**
- * Text: how long a reason's alarm has been active, that it is acknowledged, or that there is none yet.
+ * Text: how long a task's alarms have been active, that they are acknowledged, or that there is none yet.
  * Null: unknown, a past moment is shown, or the banner already dates the data.
  */
-export function useSince(tagId: string, reason: HealthReason): string | null {
+export function useSince({ tagId, reasons, isAcknowledged }: Urgent): string | null {
   const isCurrent = useApp(selectIsCurrent);
-  const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
+  const active = useSelected(alarmList, (list) => list.active);
   const isKnown = useApp(selectAreAlarmsKnown);
   if (!isCurrent) return null;
-  if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
-  if (found.isAcknowledged) return S.healthAcknowledged;
+  const oldest = oldestOf(reasons.flatMap((each) => alarmOf(active, tagId, each) ?? []));
+  if (!oldest) return isKnown && isAwaited(reasons[0]) ? S.alarmNotYet : null;
+  if (isAcknowledged) return S.healthAcknowledged;
   const state = store.get();
-  return sinceText(found.alarm, rosNow(state, now()), selectKnownSince(state), false);
+  return sinceText(oldest, rosNow(state, now()), selectKnownSince(state), false);
 }
 
 /**
@@ -134,22 +140,17 @@ export function DoNow({
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isLast && own}
       {isOfTags ? (
-        lines.map(([{ tagId, reasons }, ...others], index) => (
+        lines.map(([task, ...others], index) => (
           <li key={index}>
             <button
               type="button"
-              data-tag-id={tagId}
+              data-tag-id={task.tagId}
               onClick={() => {
-                act(withTag(tagId));
+                act(withTag(task.tagId));
               }}
             >
-              <HealthMark verdict={reasons[0].verdict} word={false} />
-              <Todo
-                tagId={tagId}
-                reason={reasons[0]}
-                also={hasAlso ? others : []}
-                id={index === 0 ? id : undefined}
-              />
+              <HealthMark verdict={task.reasons[0].verdict} word={false} />
+              <Todo task={task} also={hasAlso ? others : []} id={index === 0 ? id : undefined} />
             </button>
             {index === lines.length - 1 && rest > 0 && (
               <button
@@ -214,19 +215,21 @@ function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Eleme
 }
 
 function Todo({
-  tagId,
-  reason,
+  task,
   also,
   id,
 }: {
-  tagId: string;
-  reason: HealthReason;
+  task: Urgent;
   /** Other tags with the same action. */
   also: readonly Urgent[];
   id: string | undefined;
 }): JSX.Element {
-  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true, tagId));
-  const since = useSince(tagId, reason);
+  const { tagId } = task;
+  const [reason] = task.reasons;
+  // Other causes of the same task are on the card.
+  const [cause = []] = byCause(task.reasons);
+  const why = S.healthDriver(shown(tagId, 24), useCauseText(cause, true, tagId));
+  const since = useSince(task);
   const isCurrent = useApp(selectIsCurrent);
   return (
     <>
@@ -251,7 +254,7 @@ export function Overall({
   id?: string;
 }): JSX.Element | null {
   const [own] = health.reasons;
-  const reason = useReasonText(own ?? null);
+  const reason = useCauseText(own ? [own] : []);
   // The alarm list is always live.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const active = useSelected(alarmList, (list) => list.active.length);

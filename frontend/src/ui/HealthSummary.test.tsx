@@ -77,6 +77,37 @@ test('says what to do first, and since when', () => {
   stop();
 });
 
+test('a damp spell at a tag is one task, from its first alarm on; what failed while the past is read counts', () => {
+  const humid = reason({ sensor: 'humidity', verdict: 'stressed', value: 93, limit: 85 });
+  const vpd = reason({ sensor: 'vpd', verdict: 'stressed', value: 0.15, limit: 0.2 });
+  const margin = reason({ ...vpd, sensor: 'condensation_margin', value: 1.1, limit: 1.5 });
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  showTags(TAGS, judgement({ 1: [failed], 5: [humid, vpd, margin] }));
+  const stop = startAlarms();
+  render(<HealthSummary kiosk={false} />);
+  const tasks = () =>
+    [...screen.getByRole('list', { name: 'Do this now' }).children].map((it) => it.textContent);
+  const air = 'Air too damp: Dew margin 1.1\u00a0K, VPD 0.15\u00a0kPa, Humidity 93.0\u00a0%';
+  act(() => {
+    receive({ alarms: alarms([], { source: 'starting' }) });
+  });
+  expect(tasks()).toEqual([
+    `StressedTag 5: ${air}Ventilate and heat `,
+    'UnknownTag 1: Last scan failed: not reachableCheck the path and the tag ',
+  ]);
+  act(() => {
+    const at = { tag_id: '5' };
+    reportAlarms(
+      alarm('rh', { ...at, raised: 200, reason: humid }),
+      alarm('vpd', { ...at, raised: 100, reason: vpd }),
+    );
+  });
+  expect(tasks()).toEqual([
+    expect.stringMatching(`^StressedTag 5: ${air}Ventilate and heat since sim 00:01:40$`),
+  ]);
+  stop();
+});
+
 test('nobody is called for what is shelved, and all the rest is counted', () => {
   const tags = ['1', '2', '3', '4', '5'].map((tag_id) => wireTag({ tag_id }));
   const mild = reason({ verdict: 'stressed' });
@@ -98,7 +129,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   expect(store.get().view.list).toBe('tags');
   expect(house().textContent).not.toContain('Shelved');
   act(() => {
-    for (const item of calling(alarmList.get()).slice(0, 1)) shelveAlarm(item, 15, 'fan');
+    for (const item of calling(alarmList.get()).slice(0, 1)) shelveAlarm(item.alarm, 15, 'fan');
   });
   expect(todo.textContent).toMatch(/^StressedTag 4: .*StressedTag 2: .*also tag 3 .*\+ 1 tag$/);
   fireEvent.click(screen.getByRole('button', { name: '+ 1 tag' }));
@@ -122,7 +153,7 @@ test('that it is too cold is not shelved with that it was too warm', () => {
   render(<HealthSummary kiosk={false} />);
   act(() => {
     reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
-    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+    for (const item of calling(alarmList.get())) shelveAlarm(item.alarm, 15, 'fan');
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent).toBe('');
@@ -296,7 +327,7 @@ test('beside an active alarm, healthy says why', () => {
   );
   // A shelved one is not called active, but counted.
   act(() => {
-    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+    for (const item of calling(alarmList.get())) shelveAlarm(item.alarm, 15, 'fan');
   });
   expect(driver().textContent).toMatch(/^All assessed readings/);
   expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();

@@ -5,7 +5,7 @@ import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { isOldReading, type TagThen } from '../domain/difference';
 import { ageSeconds, type When } from '../domain/time';
-import { reasonText, todoText } from '../domain/health';
+import { byCause, causeText, todoText } from '../domain/health';
 import { whenOf } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { useSelected } from '../store/create';
@@ -15,9 +15,9 @@ import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { HealthShape } from './HealthMark';
 
-/** A reason in words, with the age at the shown moment of what it is about. */
-export function useReasonText(
-  reason: HealthReason | null,
+/** Reasons of one cause in words, with the age at the shown moment of what they are about. */
+export function useCauseText(
+  reasons: readonly HealthReason[],
   isMarked = false,
   /** Empty: the greenhouse. */
   tagId = '',
@@ -28,6 +28,7 @@ export function useReasonText(
   const isReceiving = useApp(selectIsReceiving);
   const catalogue = useApp(selectCatalogue);
   return useTicking((now) => {
+    const [reason] = reasons;
     if (!reason) return '';
     const when =
       tag && health
@@ -35,7 +36,7 @@ export function useReasonText(
         : reason.since && snapshot
           ? whenOf(reason.since, snapshot)
           : 'unknown';
-    return reasonText(catalogue, reason, ageSeconds(when, now, ageing), isMarked);
+    return causeText(catalogue, reasons, ageSeconds(when, now, ageing), isMarked);
   });
 }
 
@@ -53,12 +54,17 @@ function whenShown(
     : null;
 }
 
-/** A reason's text, for use beside its mark. */
-function Reason({ reason, tagId }: { reason: HealthReason; tagId: string }): JSX.Element {
-  return <>{useReasonText(reason, true, tagId)}</>;
+interface CauseProps {
+  readonly reasons: readonly [HealthReason, ...HealthReason[]];
+  readonly tagId: string;
 }
 
-/** Reasons for a tag's verdict, the worst first. */
+/** A cause's text, for use beside its mark. */
+function Cause({ reasons, tagId }: CauseProps): JSX.Element {
+  return <>{useCauseText(reasons, true, tagId)}</>;
+}
+
+/** Causes of a tag's verdict, the worst first. */
 export function Reasons({
   health,
   tagId,
@@ -71,35 +77,38 @@ export function Reasons({
   /** Whether to add what to do about each reason. */
   hasTodo?: boolean;
 }): JSX.Element | null {
-  const { reasons } = health;
-  if (reasons.length === 0) return null;
+  const causes = byCause(health.reasons);
+  if (causes.length === 0) return null;
   return (
     <ul className="reasons" aria-label={S.reasonsLabel} data-testid="reasons">
-      {reasons.slice(0, most).map((reason) => (
-        <li key={`${reason.kind} ${reason.sensor}`} data-kind={reason.kind}>
-          <HealthShape verdict={reason.verdict} />
+      {causes.slice(0, most).map((reasons) => (
+        <li key={`${reasons[0].kind} ${reasons[0].sensor}`} data-kind={reasons[0].kind}>
+          <HealthShape verdict={reasons[0].verdict} />
           <span>
-            <Reason reason={reason} tagId={tagId} />
+            <Cause reasons={reasons} tagId={tagId} />
           </span>
-          {hasTodo && <Todo tagId={tagId} reason={reason} />}
+          {hasTodo && <Todo reasons={reasons} tagId={tagId} />}
         </li>
       ))}
-      {reasons.length > most && <li className="faint">{S.cardMore(reasons.length - most)}</li>}
+      {causes.length > most && <li className="faint">{S.cardMore(causes.length - most)}</li>}
     </ul>
   );
 }
 
-/** What to do about a reason, and whether its alarm is still pending; nothing while shelved. */
-function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
+/** What to do about a cause, and whether its alarm is still pending; nothing while shelved. */
+function Todo({ tagId, reasons }: CauseProps): JSX.Element | null {
   const { active, shelved } = useSelected(alarmList);
   const isKnown = useApp(selectAreAlarmsKnown);
-  if (alarmOf(shelved, tagId, reason)) return null;
-  const isNone = !alarmOf(active, tagId, reason);
+  const [reason] = reasons;
+  if (reasons.every((each) => alarmOf(shelved, tagId, each))) return null;
+  const isNone = reasons.every((each) => !alarmOf(active, tagId, each));
   const isWaiting = isKnown && isAwaited(reason) && isNone;
   return (
     <span>
       {/* A single failed scan is ordinary. */}
-      {!(isNone && reason.kind === 'scan_failed') && <strong>{todoText(reason)}</strong>}{' '}
+      {!(isKnown && isNone && reason.kind === 'scan_failed') && (
+        <strong>{todoText(reason)}</strong>
+      )}{' '}
       {isWaiting && <small className="faint">{S.alarmNotYet}</small>}
     </span>
   );

@@ -4,10 +4,11 @@ import { differenceShown, trendOf } from '../domain/difference';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import {
   beyondText,
+  byCause,
+  causeText,
   isBack,
   rangeReason,
   reasonsText,
-  reasonText,
   sideOf,
   worstReason,
 } from '../domain/health';
@@ -54,9 +55,9 @@ export const TagRow = memo(function TagRow(props: Props): JSX.Element {
   const all = reasonsText(catalogue, health.reasons);
   // Mention a failed scan once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedAttempt || kind !== 'scan_failed');
-  const texts = others.map((reason, place): ReactNode =>
+  const texts = byCause(others).map((reasons, place): ReactNode =>
     // The row's mark already gives the worst reason's verdict.
-    reasonText(catalogue, reason, null, place === 0),
+    causeText(catalogue, reasons, null, place === 0),
   );
   if (tag.failedAttempt) {
     const attempt = (

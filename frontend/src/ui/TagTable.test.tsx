@@ -1,10 +1,10 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { beforeEach, describe, expect, test } from 'vitest';
 
-import { act, prefer, store } from '../store/app';
+import { act, prefer, receive, store } from '../store/app';
 import { judgement, reason } from '../testing/health';
 import { hourAgo } from '../store/hourAgo';
-import { goLive, showTags, status } from '../testing/page';
+import { goLive, goLost, showTags, status } from '../testing/page';
 import { readings, tag, wireTag } from '../testing/tags';
 import { TagTable } from './TagTable';
 
@@ -256,4 +256,22 @@ describe('table', () => {
     expect(document.body.textContent).toContain('<img src=x');
     expect(document.body.textContent).not.toContain('\u202e');
   });
+});
+
+test('of a silent twin, all is as last judged, but without an age nothing is healthy', () => {
+  showTags(
+    [wireTag({ tag_id: '1' }), wireTag({ tag_id: '5' })],
+    judgement({ 1: 'healthy', 5: [reason()] }),
+  );
+  render(<TagTable />);
+  const verdicts = () =>
+    [...document.querySelectorAll<HTMLElement>('tr[data-tag-id]')]
+      .map(({ dataset }) => `${dataset['tagId']} ${dataset['health']}`)
+      .sort();
+  flush(goLost);
+  expect(verdicts()).toEqual(['1 healthy', '5 critical']);
+  flush(() => {
+    receive({ isTimeLost: true });
+  });
+  expect(verdicts()).toEqual(['1 unknown', '5 critical']);
 });

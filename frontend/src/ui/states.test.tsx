@@ -6,6 +6,7 @@ import { render } from '@testing-library/react';
 import { afterAll, beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
+import { byCause } from '../domain/health';
 
 type ReportedReason = readonly [
   HealthReason['kind'],
@@ -227,8 +228,17 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
       const why = row?.querySelector('.why')?.textContent ?? '';
       // Without a reason, it may say that nothing has an ideal range.
       const isUnranged = /(with an ideal range|mit Idealbereich)$/.test(why);
-      expect(why === '' || isUnranged ? [] : why.split('; ')).toHaveLength(reasons.length);
-      for (const [index, each] of reasons.entries()) expectSaid(why.split('; ')[index] ?? '', each);
+      const causes = byCause(reasons.map(reasonOf));
+      const texts = why === '' || isUnranged ? [] : why.split('; ');
+      expect(texts).toHaveLength(causes.length);
+      for (const [kind, verdict, sensor, value, limit] of reasons) {
+        const at = causes.findIndex((own) =>
+          own.some((it) => it.kind === kind && it.sensor === sensor),
+        );
+        if (causes[at]?.length === 1)
+          expectSaid(texts[at] ?? '', [kind, verdict, sensor, value, limit]);
+        else expect(texts[at]).toContain(words.sensors[sensor]);
+      }
     }
 
     for (const [tag_id, kind, sensor, verdict] of state.alarms) {
@@ -244,7 +254,8 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
         ...{ id: `${tag_id} ${kind}`, tag_id, raised_at: SINCE, cleared_at: null, worst: null },
         reason: reasonOf(reported),
       };
-      const text = page.textNow(page.store.get(), alarm);
+      const item = { alarm, isAcknowledged: false, shelf: null };
+      const text = page.severalNow(page.store.get(), [item], ([only = '']) => only);
       expect(text.startsWith(tag_id === '' ? words.house : words.tag.replace('1', tag_id))).toBe(
         true,
       );

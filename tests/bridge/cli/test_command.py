@@ -47,7 +47,13 @@ def test_arguments_after_ros_args_belong_to_ros_up_to_a_double_dash(
     ("arguments", "named"),
     [
         (["serve", "--port", "70000"], "--port is '70000': input should be less than or equal"),
-        (["serve", "--max-client", "5"], "unrecognized arguments: --max-client 5"),
+        (
+            ["serve", "--max-client", "5"],
+            "--max-client is not an option of serve (did you mean --max-clients?)",
+        ),
+        (["serve", "-p", "a:=1"], "-p is not an option of serve: put it after --ros-args"),
+        (["journal", "info", "x"], "x is not an option of journal"),
+        (["web", "--ros-args", "-p", "a=1"], "-p is 'a=1', expected NAME:=VALUE"),
         (["demo", "--speed", "0"], "--speed is 0.0, it must be from 0.1 to 50.0"),
         (["demo", "--speed", "101", "--from", "x"], "--speed is 101.0, it must be from 0.1 to 100"),
         (["demo", "--seed", "-1"], "--seed is -1, it must be from 0 to 4294967295"),

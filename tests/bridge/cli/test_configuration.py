@@ -84,7 +84,7 @@ def test_an_environment_variable_may_name_the_file_and_is_named(
             "\n# a comment\n  port = true",
             " line 3: port is 'True': input should be a valid integer",
         ),
-        ("allow_host = 'x'", " line 1: allow_host is 'x': input should be a valid tuple"),
+        ("allow_host = 'x'", " line 1: allow_host is 'x': expected a list, such as ['x']"),
         ('"a\\nb" = 1', ": 'a\\nb' is not a setting of the bridge"),
         ("token = 'x'", " line 1: token is not a setting: put the token into a file of its own"),
         (

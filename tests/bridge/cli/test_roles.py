@@ -60,14 +60,15 @@ def test_a_port_in_use_is_named(domain: int, role: str) -> None:
         port = taken.getsockname()[1]
         with lupin_twin(domain, role, "--port", str(port)) as process:
             line = refused(process)
-    assert line == f"lupin-twin: cannot listen on 127.0.0.1 port {port}: Address already in use"
+    assert line.startswith(f"lupin-twin: cannot listen on 127.0.0.1 port {port}: Address already")
+    assert line.endswith(", or choose another --port")
 
 
 @pytest.mark.parametrize(
     ("role", "arguments", "named"),
     [
         ("serve", ("--ros-args", "-p", "idw_power:=-1.0"), "idw_power is -1.0, expected 0.01 to 1"),
-        ("serve", ("--ros-args", "-p", "nonsense"), "parse parameter override rule: '-p nonsense'"),
+        ("serve", ("--ros-args", "-p", ":=nonsense"), "parameter override rule: '-p :=nonsense'"),
         ("web", ("--journal", "postgresql://db/lupin"), "'postgresql://db/lupin', expected a file"),
     ],
 )

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from lupin_bridge.feed import past_process
 from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.past_process import MAX_PENDING, PastProcess
-from lupin_bridge.feed.query import NICENESS, Now, as_found, export_step
+from lupin_bridge.feed.query import NICENESS, LogReader, Now, export_step
 from lupin_bridge.feed.source import TwinTimeoutError
 from lupin_bridge.feed.tasks import Periodic, Shared
 from lupin_bridge.past.plans import Answered
@@ -110,7 +110,7 @@ async def test_damage_found_by_a_query_quarantines_the_file(domain: int, tmp_pat
 async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain: int) -> None:
     async with started(LocalTwin) as (twin, _):
         await until(lambda: twin.journal().state == "recording", "the journal")
-        await twin.past.ask(partial(as_found, 0), await twin.now(), 0.0)
+        await twin.past.ask(partial(LogReader.state, at_ns=0), await twin.now(), 0.0)
         waiting = asyncio.create_task(twin.ask(endless, 0.0))
         await until(lambda: len(twin.past.pending) == 1, "the query")
         # Meanwhile the ROS thread answers as usual.

@@ -334,11 +334,14 @@ def test_a_sites_clock_may_be_wrong_by_a_year(archive: Archive, tmp_path: Path) 
     archive.keep_live()
     with fleet(archive) as running:
         for name, now_ns in sites.items():
-            found = running.site(name, is_live=True, active_alarms=0)
+            # Never healthy: how old a reading is, nobody knows.
+            found = running.site(name, is_live=True, active_alarms=0, verdict="unknown")
             assert abs(found["last_received"]["sec"] - now_ns // 10**9) < 60
             below = f"/sites/{name}/api"
             (tag,) = running.http.get(f"{below}/state").json()["tags"]
             assert tag["stale_seconds"] >= 0
+            said = "ten minutes ahead of" in running.http.get(f"/sites/{name}/readyz").text
+            assert said == (name == "ahead")
             past = running.http.get(f"{below}/state?at={now_ns // 10**9 - 3}")
             # A moment in the past of the site can be queried.
             assert [it["tag_id"] for it in past.json()["tags"]] == ["7"]

@@ -4,6 +4,7 @@ import asyncio
 import random
 import time
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import pytest
 
 from lupin_bridge.fleet import source
 from lupin_bridge.fleet.overview import Site, dots, map_svg, map_version
-from lupin_bridge.fleet.reader import Latest, Reported
+from lupin_bridge.fleet.reader import Reported, latest
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.settings import Settings
@@ -160,7 +161,7 @@ async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_
 
     async def ask(query: object, *_: object) -> Any:
         nonlocal looks
-        if isinstance(query, Latest):
+        if isinstance(query, partial) and query.func is latest:
             return Reported(Snapshot(1, "map", ()), True, World("unknown"), (), None, 0, None)
         await asyncio.sleep(0.01)
         looks += 1

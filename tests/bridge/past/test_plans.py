@@ -32,7 +32,6 @@ from lupin_bridge.past.plans import (
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
-from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import (
     DAY_NS,
     EVERY_TAG,
@@ -40,7 +39,6 @@ from lupin_twin.core.past import (
     MAX_READINGS,
     PastRefused,
     PastWrite,
-    RecentRequest,
     SeriesPast,
     SeriesRequest,
     grid,
@@ -51,6 +49,7 @@ from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.idw import never
 from lupin_twin.journal.counts import Buckets, individually
 from lupin_twin.runtime.workers import SMALL_S
+from tests.support.past import MadeUp
 
 NS = 10**9
 CRITERIA = Criteria(own_sensors(), None, ClockDay(UTC))
@@ -63,6 +62,10 @@ def tag(tag_id: str, x: float, value: float, at_ns: int = NS) -> TagState:
 
 
 SITE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
+
+
+def log_of(snapshot: Snapshot, **more: Any) -> Any:
+    return MadeUp(9 * NS, snapshot=snapshot, **more)
 
 
 def requested(rules: FieldRules = RULES, **parameters: Any) -> Field:
@@ -103,7 +106,7 @@ def test_a_broken_sensor_is_used_for_no_field_and_no_estimate() -> None:
 
     def made_of(*readings: tuple[int, float]) -> str:
         past = TagPast("a", 0.0, 0.0, readings)
-        return estimated.look(lambda need: SITE if need == 5 * NS else [past]).etag
+        return estimated.look(log_of(SITE, pasts=[past])).etag
 
     good = (NS, 400.0), (2 * NS, 410.0)
     assert made_of(*good, (3 * NS, -1.0)) == made_of(*good)
@@ -128,7 +131,7 @@ def test_a_derived_reading_uses_the_readings_of_one_scan() -> None:
 
 def test_before_the_first_observation_state_and_field_are_empty() -> None:
     nothing = Snapshot(1, "map", ())
-    assert body(WholeState(1).look(lambda _: nothing))["tags"] == []
+    assert body(WholeState(1).look(log_of(nothing)))["tags"] == []
     found = body(field_of(nothing, requested(), JSON))
     assert (found["sample_count"], set(found["values"])) == (0, {None})
 
@@ -136,12 +139,12 @@ def test_before_the_first_observation_state_and_field_are_empty() -> None:
 def judged_at(at_s: float, *tags: TagState, before_s: Sequence[float] = ()) -> Plan:
     """Where tag a was also scanned some seconds before its own second."""
     at_ns = int(at_s * NS)
-    recent = [
+    recent = tuple(
         PastWrite(number, 1, "a", int((1 - second) * NS), 0, 0, ("temperature",), (22.0,))
         for number, second in enumerate(before_s)
-    ]
-    log: dict[Any, Any] = {at_ns: Snapshot(at_ns, "map", tags), RecentRequest(at_ns): tuple(recent)}
-    return Health(at_ns, CRITERIA).look(lambda need: log.get(need, ()))
+    )
+    log = log_of(Snapshot(at_ns, "map", tags), scanned=recent)
+    return Health(at_ns, CRITERIA).look(log)
 
 
 def verdict_of(plan: Plan) -> tuple[str, str]:
@@ -213,13 +216,7 @@ QUERIES: tuple[Query, ...] = (
 
 def answer(query: Query, has: str = "") -> Answered:
     """The answer for this greenhouse, and for series without an entry."""
-    return answered(query, has, in_site, never)
-
-
-def in_site(need: Any) -> Any:
-    if isinstance(need, SeriesRequest):
-        return SeriesPast(0, 9 * NS)
-    return SITE if isinstance(need, int) else ()
+    return answered(query, has, log_of(SITE))
 
 
 def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> None:
@@ -237,8 +234,7 @@ def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> Non
 def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
     tag = TagState("a", None, (Reading("co2", 7.0, 5 * NS),), 5 * NS, last_try=Attempt(5 * NS))
     for latest, values in ((tag, [7.0]), (None, [])):
-        log: dict[Any, Any] = {LatestRequest("a", 3): []}
-        body = LatestOfTag("a", latest, 3).look(log.__getitem__).write(never).body
+        body = LatestOfTag("a", latest, 3).look(log_of(SITE)).write(never).body
         reported = json.loads(body)
         assert [
             each["value"] for sensor in reported["sensors"] for each in sensor["values"]

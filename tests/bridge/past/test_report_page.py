@@ -146,10 +146,13 @@ def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_c
 
 
 def test_the_report_names_its_greenhouse_and_says_from_when_to_when_it_is_complete() -> None:
-    whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
+    whole, late, empty = (page_of(kept_from=at(hours * HOUR_S)) for hours in (0, 1, 8))
     assert "No data before" not in whole
     assert "Complete up to 27 Nov 2026, 14:00." in whole
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
+    # No alarms and no gaps, but not because all was well.
+    assert "No data of this period is kept" in empty
+    assert "Complete up to" not in empty
     end_ns = (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN_JOURNAL, "de")
     assert "Simuliert" not in text_of(page, 1)

@@ -349,7 +349,7 @@ async def test_simultaneous_equal_queries_run_once(domain: int) -> None:
         return past.snapshot
 
     async with remembering(past) as it:
-        past.state_at = held  # type: ignore[method-assign]
+        past.state = held  # type: ignore[method-assign]
         number = it.bridge.state_number
         asking = [asyncio.create_task(it.http.get(f"{PATHS[0]}&at=9")) for _ in range(5)]
         in_flight = it.bridge.admission.in_flight

@@ -16,9 +16,6 @@ from lupin_twin.core.past import (
     MAX_POINTS,
     MAX_WRITES,
     Event,
-    PeriodRequest,
-    RecentRequest,
-    ScansRequest,
     SeriesRequest,
     WritesRequest,
     recent_of,
@@ -138,9 +135,9 @@ def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> No
 
     def found(log: Any) -> list[Any]:
         return [
-            recent(log, RecentRequest(end_ns)),
-            scans(log, ScansRequest(start_ns, end_ns, sensors)),
-            observed(log, PeriodRequest(start_ns, end_ns)).writes,
+            recent(log, end_ns),
+            scans(log, start_ns, end_ns, sensors),
+            observed(log, start_ns, end_ns).writes,
             writes(log, whole),
             [state_at(log, at_ns, "map") for at_ns in (start_ns, end_ns)],
         ]

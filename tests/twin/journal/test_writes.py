@@ -3,7 +3,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lupin_twin.core.past import PastWrite, PastWrites, RecentRequest, WritesRequest, recent_of
+from lupin_twin.core.past import PastWrite, PastWrites, WritesRequest, recent_of
 from lupin_twin.core.state import NO_FLOWER
 from lupin_twin.journal.writes import recent, writes
 from tests.support.journal import SECOND, inspection, pin, scan
@@ -78,7 +78,7 @@ def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
         life.write([scan("7", BEGUN + 17, source="b", h=5.0), failure("7", BEGUN + 16)])
         life.write([scan("8", BEGUN - 3 * DAY + 16, t=1.0), scan("8", BEGUN - 3 * DAY + 17, t=2.0)])
         life.write(inspection("8", BEGUN + n, anomaly=bool(n % 2)) for n in range(20))
-        then = RecentRequest(BEGUN + 17)
+        then = BEGUN + 17
         found = recent(life.connection, then)
         stamps = {
             (tag, kind): [w.stamp_ns - BEGUN for w in found if (w.tag_id, w.kind) == (tag, kind)]
@@ -92,8 +92,8 @@ def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
             ("8", 1): [9, 10, 11, 12, 13, 14, 15, 16, 17],
         }
         assert recent(copied(life.connection), then) == found
-        assert recent_of(requested(life.connection).writes, then.at_ns) == found
-        assert recent(life.connection, RecentRequest(BEGUN - 9 * DAY)) == ()
+        assert recent_of(requested(life.connection).writes, then) == found
+        assert recent(life.connection, BEGUN - 9 * DAY) == ()
 
 
 def test_an_uncertain_species_is_left_out(tmp_path: Path) -> None:

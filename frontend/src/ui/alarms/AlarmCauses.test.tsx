@@ -7,8 +7,9 @@ import type { Alarm } from '../../contract/types';
 import { store } from '../../store/app';
 import { person } from '../../store/create';
 import { alarm, reportAlarms } from '../../testing/alarms';
+import { judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
-import { wireTag } from '../../testing/tags';
+import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
 let stop: () => void;
@@ -81,6 +82,35 @@ test('many of one cause that are resolved have nothing to do, and say when the l
   expect(heading.querySelector('small')?.textContent).toBe('resolved sim 00:15:54');
   // The empty tools cell stays, to align the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
+});
+
+test('a damp spell at a tag is one row with all its values, acknowledged as one, and undone as one', () => {
+  const humid = { sensor: 'humidity', verdict: 'stressed', value: 93, limit: 85 } as const;
+  const vpd = { sensor: 'vpd', verdict: 'critical', value: 0.04, limit: 0.05 } as const;
+  act(() => {
+    const read = readings({ humidity: 93, temperature: 20 });
+    const judged = judgement({ 4: [reason(vpd), reason(humid)] });
+    showTags([wireTag({ tag_id: '4', readings: read })], judged);
+  });
+  report(
+    alarm('rh', { tag_id: '4', raised: 80, reason: humid }),
+    alarm('vpd', { tag_id: '4', raised: 85, reason: vpd }),
+  );
+  const row = document.querySelector<HTMLElement>('.alarm-cause');
+  expect(row?.dataset).toMatchObject({ health: 'critical', where: '4' });
+  expect(row?.querySelector('[data-fact=since]')?.textContent).toMatch(/^since sim 00:01:20/);
+  expect(row?.querySelector('.alarm-text')?.textContent).toMatch(
+    /^Tag 4: Air too damp 2 alarms Ventilate and heatVPD 0.04\u00a0kPa \(critical\), Humidity 93.0\u00a0%$/,
+  );
+  expect(group('active'), 'its values are in the heading').toEqual([]);
+  fireEvent.click(screen.getByRole('button', { name: /^Acknowledge: Air too damp/ }));
+  expect([...own.get().acknowledged.keys()]).toEqual(['vpd', 'rh']);
+  expect(row?.querySelector('.alarm-tools')?.textContent).toBe('acknowledged');
+  fireEvent.click(screen.getByRole('button', { name: 'Undo' }));
+  expect(own.get().acknowledged.size).toBe(0);
+  fireEvent.click(screen.getByRole('button', { name: /2 alarms/ }));
+  expect(store.get().view.selected).toBe('4');
+  expect(group('active'), 'each to be shelved or commented').toHaveLength(2);
 });
 
 test('an alarm’s menu leads to its start', () => {

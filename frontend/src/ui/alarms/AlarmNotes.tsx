@@ -1,9 +1,9 @@
 import { useId, useMemo, type JSX, type ReactNode } from 'react';
 
 import { alarmOf, isAwaited } from '../../alarms/list';
-import { notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
+import { isPushed, notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
 import { lastAction, own, undo } from '../../alarms/own';
-import { textNow } from '../../alarms/latest';
+import { severalNow } from '../../alarms/latest';
 import { alarmList, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
@@ -81,14 +81,16 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
 export function Meanwhile(): JSX.Element | null {
   const items = useSelected(meanwhile);
   const [worst] = items;
-  const text = useApp((state) => (worst ? textNow(state, worst.alarm) : ''));
+  const text = useApp((state) =>
+    severalNow(state, items, ([first = ''], more) => S.alarmsMeanwhile(first, more), 1),
+  );
   if (!worst) return null;
   const { alarm } = worst;
   const { verdict } = alarm.reason;
   return (
     <div className="meanwhile" data-testid="meanwhile" data-health={verdict}>
       <HealthMark verdict={verdict} word={false} />
-      <strong>{S.alarmsMeanwhile(text, items.length - 1)}</strong>
+      <strong>{text}</strong>
       <button
         type="button"
         onClick={() => {
@@ -142,6 +144,7 @@ export function NotifySettings(): JSX.Element {
   const sound = useSelected(soundState);
   const notify = useSelected(notifyState);
   const isPossible = notify === 'granted' || notify === 'prompt';
+  const also = useSelected(isPushed) ? ` ${S.alarmNotifyPushed}` : '';
   return (
     <>
       <Way
@@ -156,7 +159,7 @@ export function NotifySettings(): JSX.Element {
         label={S.alarmNotify}
         isOn={local.notify && notify === 'granted'}
         isPossible={isPossible}
-        hint={isPossible ? S.alarmNotifyHint : S.alarmNotifyNot[notify]}
+        hint={isPossible ? S.alarmNotifyHint + also : S.alarmNotifyNot[notify]}
         onChange={setNotify}
       />
     </>

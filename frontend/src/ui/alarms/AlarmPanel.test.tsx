@@ -324,7 +324,7 @@ test('without an alarm it says so; where that is not known it says that', () => 
   report(ofTag);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
-    shelveAlarm({ alarm: ofTag }, 15, 'fan');
+    shelveAlarm(ofTag, 15, 'fan');
   });
   expect(group('shelved')).toHaveLength(1);
   expect(screen.queryByText(wait)).toBeNull();

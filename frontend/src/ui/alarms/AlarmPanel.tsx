@@ -6,6 +6,7 @@ import {
   countsText,
   filtered,
   ORDERS,
+  tagsOf,
   tagsText,
   type Block,
   type Order,
@@ -21,9 +22,13 @@ import {
   type Item,
 } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
+import { showAlarm } from '../../alarms/follow';
 import { selectNow, todoNow, worstNow, worstNowFirst } from '../../alarms/latest';
+import { partsText, whereText, type Now } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
+import type { Alarm } from '../../contract/types';
+import { airOf } from '../../domain/health';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
@@ -38,7 +43,7 @@ import { AlarmTimes, AlarmTodo, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { sharingText, useIsRefused } from './people';
+import { sharingText, useIsRefused, useWhoAcknowledged } from './people';
 
 /** Rows shown when a shared cause is opened; for others, and with each "more", `MOST_ROWS`. */
 const MOST_OF_CAUSE = 5;
@@ -218,7 +223,7 @@ function Group({
   );
 }
 
-/** Alarm rows of a block; of a shared cause, its first row until its heading is clicked. */
+/** Alarm rows of a block; of a shared cause, until its heading is clicked, its first row if it has several tags. */
 function Rows({
   block: { cause, items },
   group,
@@ -226,10 +231,12 @@ function Rows({
   block: Block;
   group: keyof AlarmList;
 }): JSX.Element {
-  const [most, setMost] = useState(cause === null ? MOST_ROWS : 1);
+  const [most, setMost] = useState(cause === null ? MOST_ROWS : 0);
   // On paper everything is expanded.
   const isPaper = usePaper();
-  const shown = isPaper ? items.length : most;
+  // The heading of a single tag has all its values.
+  const least = tagsOf(items).length > 1 ? 1 : 0;
+  const shown = isPaper ? items.length : Math.max(most, least);
   const rest = items.length - shown;
   return (
     <>
@@ -238,9 +245,9 @@ function Rows({
           cause={cause}
           items={items}
           group={group}
-          isOpen={most > 1}
+          isOpen={most > 0}
           onToggle={() => {
-            setMost(most > 1 ? 1 : MOST_OF_CAUSE);
+            setMost(most > 0 ? 0 : MOST_OF_CAUSE);
           }}
         />
       )}
@@ -249,7 +256,7 @@ function Rows({
           <AlarmRow key={item.alarm.id} item={item} group={group} />
         ))}
       </ul>
-      {rest > 0 && most > 1 && (
+      {rest > 0 && most > 0 && (
         <button
           type="button"
           className="text-button alarm-more"
@@ -264,7 +271,10 @@ function Rows({
   );
 }
 
-/** Heading of a shared cause: what is wrong, what to do, and at which tags; its first row has the values. */
+/**
+ * Heading of a shared cause: what is wrong, what to do, and at which tags, whose first row has the values;
+ * or at which tag, with the values.
+ */
 function CauseHeading({
   cause,
   items,
@@ -280,17 +290,37 @@ function CauseHeading({
 }): JSX.Element | null {
   // While the order is held, alarms that left the group are still listed.
   const own = items.filter((item) => groupOf(item) === group);
-  const counts = useApp((state) => countsText(own, (alarm) => selectNow(state, alarm)));
   const shown = own.length > 0 ? own : items;
+  const tags = tagsOf(items);
+  const only = tags.length === 1 ? shown[0] : undefined;
+  const facts = useApp((state) => {
+    const nowOf = (alarm: Alarm): Now | null => selectNow(state, alarm);
+    return only && airOf(only.alarm.reason)
+      ? partsText(shown, selectCatalogue(state), nowOf)
+      : countsText(own, nowOf);
+  });
+  const who = useWhoAcknowledged(only?.alarm ?? null);
   const verdict = useApp((state) => worstNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
   if (!verdict) return null;
   const waiting = unacknowledged(own);
   const oldest = group === 'resolved' ? undefined : oldestOf(shown);
-  const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   return (
-    <div className="alarm-cause" data-cause={cause} data-health={verdict}>
-      <button type="button" className="alarm-go" aria-expanded={isOpen} onClick={onToggle}>
+    <div
+      className="alarm-cause"
+      data-cause={cause}
+      data-health={verdict}
+      data-where={only?.alarm.tag_id}
+    >
+      <button
+        type="button"
+        className="alarm-go"
+        aria-expanded={isOpen}
+        onClick={() => {
+          onToggle();
+          if (only) showAlarm(only.alarm);
+        }}
+      >
         {oldest ? (
           <AlarmTimes alarm={oldest} first={null} verdict={verdict} />
         ) : (
@@ -302,14 +332,14 @@ function CauseHeading({
         )}
         <span className="alarm-text">
           <span>
-            <strong>{cause}</strong>{' '}
+            <strong>{only ? S.alarmWhat(whereText(only.alarm), cause) : cause}</strong>{' '}
             <span className="alarm-many">
               {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
           </span>
           {group === 'active' && <AlarmTodo text={todo} />}
-          {counts && <span className="alarm-facts">{counts}</span>}
-          <span className="alarm-facts faint">{tagsText(tags)}</span>
+          {facts && <span className="alarm-facts">{facts}</span>}
+          {!only && <span className="alarm-facts faint">{tagsText(tags)}</span>}
         </span>
       </button>
       {/* Rendered even without a button, to align with the rows' columns. */}
@@ -319,8 +349,12 @@ function CauseHeading({
             label={S.alarmWhat(S.alarmAcknowledge, cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
             status={
-              // By whom, its first row says.
-              waiting.length > 0 ? null : own.length > 0 ? S.healthAcknowledged : S.alarmCount(0)
+              // By whom, its first row says, if it has one.
+              waiting.length > 0
+                ? null
+                : own.length > 0
+                  ? (who ?? S.healthAcknowledged)
+                  : S.alarmCount(0)
             }
             onAcknowledge={() => {
               acknowledgeAlarms(waiting);

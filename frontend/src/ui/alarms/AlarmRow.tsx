@@ -227,7 +227,7 @@ function Shelving({ alarm, name }: { alarm: Alarm; name: string }): JSX.Element 
             disabled={isNeeded && given === ''}
             onClick={ignoreDoubleClick(() => {
               close();
-              shelveAlarm({ alarm }, minutes, given);
+              shelveAlarm(alarm, minutes, given);
             })}
           >
             {S.alarmShelveFor(ageText(minutes * 60))}

@@ -111,7 +111,7 @@ test('what is shelved says until when and why, has its way back, and is no order
     screen.getByTestId('reasons').querySelector('strong')?.textContent;
   flush(() => {
     reportAlarms(alarm('a', { tag_id: '7' }), alarm('b', { tag_id: '8' }));
-    for (const item of alarmList.get().active) shelveAlarm(item, 15, 'fan ordered');
+    for (const item of alarmList.get().active) shelveAlarm(item.alarm, 15, 'fan ordered');
   });
   expect(screen.queryByTestId('card-alarms')).toBeNull();
   expect(screen.getByTestId('card-shelved').textContent).toMatch(

@@ -99,7 +99,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     none: 'Dieser Browser kann keinen Ton abspielen.',
   },
   alarmNotify: 'Benachrichtigung',
-  alarmNotifyHint: 'Der Browser meldet neue Alarme, auch wenn Sie gerade etwas anderes ansehen.',
+  alarmNotifyHint:
+    'Der Browser meldet neue Alarme, solange diese Seite im Hintergrund geöffnet ist.',
+  alarmNotifyPushed: 'Kritische Alarme kommen auch bei geschlossener Seite.',
   alarmNotifyNot: {
     insecure:
       'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',
@@ -128,7 +130,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    heldUntil: (status, isBelow, until) => `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
+    heldUntil: (status, isBelow, until) =>
+      until === null ? `noch ${status}` : `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,
@@ -160,15 +163,15 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Es wird nichts mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
+  airCause: { damp: 'Luft zu feucht', dry: 'Luft zu trocken' },
   todo: {
     sensors: {
       temperature: { below: 'Heizen oder Lüftung schließen', above: 'Lüften oder schattieren' },
-      humidity: { below: 'Befeuchten', above: 'Lüften und heizen' },
       co2: { below: 'CO₂ dosieren oder lüften', above: 'Lüften, CO₂-Dosierung prüfen' },
       light: { below: 'Assimilationslicht einschalten', above: 'Schattieren' },
       soil_moisture: { below: 'Bewässern', above: 'Weniger bewässern, Drainage prüfen' },
-      vpd: { below: 'Lüften und heizen', above: 'Befeuchten oder schattieren' },
     },
+    air: { damp: 'Lüften und heizen', dry: 'Befeuchten oder schattieren' },
     range: 'Klimaregelung prüfen',
     watch: 'Beobachten',
     reading_failed: 'Sensor prüfen',

@@ -87,7 +87,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'Die Aufzeichnung schlägt fehl.',
-      hint: 'Der Zwilling läuft weiter. Ist der Datenträger voll, bitte Platz schaffen: Dann wird wieder aufgezeichnet.',
+      hint: 'Der Zwilling läuft weiter. Ist der Datenträger voll, bitte Platz schaffen; ist er schreibgeschützt, bitte freigeben. Dann wird wieder aufgezeichnet.',
     },
     upgrading: {
       title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',

@@ -100,7 +100,9 @@ export const ALARMS = {
     none: 'This browser cannot play sound.',
   },
   alarmNotify: 'Notification',
-  alarmNotifyHint: 'The browser notifies you of new alarms while you look at something else.',
+  alarmNotifyHint:
+    'The browser notifies you of new alarms while this page is open in the background.',
+  alarmNotifyPushed: 'Critical alarms also come while it is closed.',
   alarmNotifyNot: {
     insecure: 'Browsers allow this only on addresses that begin with https:// or http://localhost.',
     refused: 'This browser blocks notifications. Allow them for this page in its settings.',
@@ -132,9 +134,11 @@ export const HEALTH = {
   /** Why a tag or the greenhouse has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
-    /** A value that was out of range keeps its status until it is well within (hysteresis). */
-    heldUntil: (status: string, isBelow: boolean, until: string): string =>
-      `${status} until ${isBelow ? 'below' : 'above'} ${until}`,
+    /** A value that was out of range keeps its status until it is well within (hysteresis). Null: it reads like `until`. */
+    heldUntil: (status: string, isBelow: boolean, until: string | null): string =>
+      until === null
+        ? `still ${status}`
+        : `${status} until ${isBelow ? 'below' : 'above'} ${until}`,
     /** For a value beyond its limit that rounds to the limit. */
     just: {
       below: (limit: string): string => `just below ${limit}`,
@@ -165,16 +169,17 @@ export const HEALTH = {
     stopped: 'No tag is being scanned: the robot has stopped, or its data is lost',
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
+  /** The cause that humidity, vapour pressure deficit and dew margin share. */
+  airCause: { damp: 'Air too damp', dry: 'Air too dry' },
   /** What to do about a reason; for well-known sensors, by sensor and side of the range. */
   todo: {
     sensors: {
       temperature: { below: 'Heat, or close the vents', above: 'Ventilate or shade' },
-      humidity: { below: 'Mist or damp down', above: 'Ventilate and heat' },
       co2: { below: 'Dose CO₂ or ventilate', above: 'Ventilate; check the CO₂ dosing' },
       light: { below: 'Switch on the lamps', above: 'Shade' },
       soil_moisture: { below: 'Water', above: 'Water less; check the drainage' },
-      vpd: { below: 'Ventilate and heat', above: 'Mist or shade' },
     },
+    air: { damp: 'Ventilate and heat', dry: 'Mist, damp down or shade' },
     range: 'Check the climate settings',
     /** For a value that is back in its range, but not far enough inside yet. */
     watch: 'Keep an eye on it',

@@ -89,7 +89,7 @@ export const PAGE = {
     },
     failing: {
       title: 'Recording has failed.',
-      hint: 'The twin keeps running. If the disk is full, free space: recording then resumes by itself.',
+      hint: 'The twin keeps running. If the disk is full, free space; if it is read-only, make it writable. Recording then resumes by itself.',
     },
     upgrading: {
       title: 'The recording of an older version is being upgraded.',

@@ -95,7 +95,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     none: 'Este navegador no puede reproducir sonido.',
   },
   alarmNotify: 'Notificación',
-  alarmNotifyHint: 'El navegador avisa de las alarmas nuevas aunque usted esté en otra ventana.',
+  alarmNotifyHint:
+    'El navegador avisa de las alarmas nuevas mientras esta página esté abierta en segundo plano.',
+  alarmNotifyPushed: 'Las alarmas críticas llegan también con la página cerrada.',
   alarmNotifyNot: {
     insecure:
       'Los navegadores solo lo permiten en direcciones que empiezan por https:// o http://localhost.',
@@ -129,7 +131,9 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
     heldUntil: (status, isBelow, until) =>
-      `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
+      until === null
+        ? `aún ${status}`
+        : `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,
@@ -164,18 +168,18 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
+  airCause: { damp: 'Aire demasiado húmedo', dry: 'Aire demasiado seco' },
   todo: {
     sensors: {
       temperature: { below: 'Calefactar o cerrar ventanas', above: 'Ventilar o sombrear' },
-      humidity: { below: 'Humidificar', above: 'Ventilar y calefactar' },
       co2: {
         below: 'Dosificar CO₂ o ventilar',
         above: 'Ventilar y revisar la dosificación de CO₂',
       },
       light: { below: 'Encender la iluminación', above: 'Sombrear' },
       soil_moisture: { below: 'Regar', above: 'Regar menos y revisar el drenaje' },
-      vpd: { below: 'Ventilar y calefactar', above: 'Humidificar o sombrear' },
     },
+    air: { damp: 'Ventilar y calefactar', dry: 'Humidificar o sombrear' },
     range: 'Revisar el control del clima',
     watch: 'Vigilar',
     reading_failed: 'Revisar el sensor',

@@ -84,7 +84,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'El registro está fallando.',
-      hint: 'El gemelo sigue en marcha. Si el disco está lleno, libere espacio: el registro se reanudará solo.',
+      hint: 'El gemelo sigue en marcha. Si el disco está lleno, libere espacio; si es de solo lectura, permita la escritura. El registro se reanudará solo.',
     },
     upgrading: {
       title: 'El registro de una versión anterior se está actualizando.',

@@ -91,7 +91,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     none: 'Deze browser kan geen geluid afspelen.',
   },
   alarmNotify: 'Melding',
-  alarmNotifyHint: 'De browser meldt nieuwe alarmen, ook als u in een ander venster werkt.',
+  alarmNotifyHint: 'De browser meldt nieuwe alarmen zolang deze pagina op de achtergrond open is.',
+  alarmNotifyPushed: 'Kritieke alarmen komen ook als de pagina gesloten is.',
   alarmNotifyNot: {
     insecure:
       'Browsers staan dit alleen toe op adressen die beginnen met https:// of http://localhost.',
@@ -120,7 +121,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    heldUntil: (status, isBelow, until) => `${status} tot ${isBelow ? 'onder' : 'boven'} ${until}`,
+    heldUntil: (status, isBelow, until) =>
+      until === null ? `nog ${status}` : `${status} tot ${isBelow ? 'onder' : 'boven'} ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,
@@ -153,15 +155,15 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Er wordt niets meer gemeten: de robot staat stil, of zijn gegevens komen niet aan',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
+  airCause: { damp: 'Lucht te vochtig', dry: 'Lucht te droog' },
   todo: {
     sensors: {
       temperature: { below: 'Stoken of luchting sluiten', above: 'Luchten of schermen' },
-      humidity: { below: 'Bevochtigen', above: 'Luchten en stoken' },
       co2: { below: 'CO₂ doseren of luchten', above: 'Luchten, CO₂-dosering controleren' },
       light: { below: 'Belichting aanzetten', above: 'Schermen' },
       soil_moisture: { below: 'Water geven', above: 'Minder water geven, drainage controleren' },
-      vpd: { below: 'Luchten en stoken', above: 'Bevochtigen of schermen' },
     },
+    air: { damp: 'Luchten en stoken', dry: 'Bevochtigen of schermen' },
     range: 'Klimaatregeling controleren',
     watch: 'In de gaten houden',
     reading_failed: 'Sensor controleren',

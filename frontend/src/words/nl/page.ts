@@ -86,7 +86,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'Het vastleggen mislukt.',
-      hint: 'De digital twin draait door. Is de schijf vol, maak dan ruimte vrij: het vastleggen gaat vanzelf verder.',
+      hint: 'De digital twin draait door. Is de schijf vol, maak dan ruimte vrij; is hij alleen-lezen, maak hem dan beschrijfbaar. Het vastleggen gaat vanzelf verder.',
     },
     upgrading: {
       title: 'De gegevens van een oudere versie worden omgezet.',

@@ -289,42 +289,6 @@ class WritesRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class RecentRequest:
-    """Request for the writes that were recent at a moment, ns of ROS time: see `RECENT_COUNT`.
-
-    They are of the run that contains the moment, without the copies that a run begins with. The
-    answer is a tuple of `PastWrite`, by stamp and number: scans with readings, and inspections
-    that saw flowers.
-    """
-
-    at_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class ScansRequest:
-    """Request for all scans with one of `sensors`, from `since_ns` to `at_ns`, both included.
-
-    They are of the run that contains `at_ns`, without copies. The answer is a tuple of `PastWrite`,
-    by stamp and number; it is empty if there are more than `MAX_SCANS`.
-    """
-
-    since_ns: int
-    at_ns: int
-    sensors: frozenset[str]
-
-
-@dataclass(frozen=True, slots=True)
-class PeriodRequest:
-    """Request for all writes in `start_ns <= stamp < end_ns`, by stamp and number, without copies.
-
-    The answer is `PastWrites`. The caller has to choose a period that is not too much at once.
-    """
-
-    start_ns: int
-    end_ns: int
-
-
-@dataclass(frozen=True, slots=True)
 class PastWrite:
     """One scan or inspection, or an attempt; `kind` and `status` as in lupin_msgs/Observation.
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from lupin_twin.core.drops import valid_text
-from lupin_twin.core.history import KIND_FLOWER, LatestRequest
+from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import STATUS_OK, Bloom, Flower, Inspection, Reading, Scan, Write
 from lupin_twin.journal import sql
@@ -57,13 +57,13 @@ def last_row(log: SiteLog, upto: int = FOREVER_NS) -> tuple[int, int, int]:
     return max(outermost(log, "DESC", upto, (*WRITTEN, "place")), default=(0, 0, 0))
 
 
-def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
-    """The last scans and inspections of a tag in the current run, in the order of arrival."""
+def latest(connection: sqlite3.Connection, tag_id: str, count: int) -> list[Scan | Inspection]:
+    """The last `count` rows of each of a tag's series in the current run, in order of arrival."""
     span = span_at(runs(connection.execute), FOREVER_NS)
     if span is None:
         return []
     parameters: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run.id}
-    parameters |= {"tag": request.tag_id, "depth": request.count}
+    parameters |= {"tag": tag_id, "depth": count}
     found = _inspections(connection, sql.LATEST_INSPECTIONS, parameters)
     for (number,) in connection.execute(sql.SERIES_OF_TAG, parameters).fetchall():
         found += _scans(connection, sql.LATEST_SCANS, parameters | {"series": number})

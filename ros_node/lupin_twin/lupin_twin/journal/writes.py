@@ -12,7 +12,7 @@ import re
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import Future
 from dataclasses import asdict, replace
 from typing import Any, Final
@@ -26,10 +26,7 @@ from lupin_twin.core.past import (
     PastRow,
     PastWrite,
     PastWrites,
-    PeriodRequest,
-    RecentRequest,
     RunSpan,
-    ScansRequest,
     WritesRequest,
     recent_of,
 )
@@ -44,12 +41,16 @@ from lupin_twin.journal.schema import SiteLog, one_view
 WRITES_S: Final = 0.05
 
 
-def observed(connection: Any, request: PeriodRequest) -> PastWrites:
-    """Return what was observed in a period; each moment comes from the run that it belongs to."""
+def observed(connection: Any, start_ns: int, end_ns: int) -> PastWrites:
+    """Return all writes in `start_ns <= stamp < end_ns`, by stamp and number, without copies.
+
+    Each moment comes from the run that it belongs to. The caller has to choose a period that is not
+    too much at once.
+    """
     log = SiteLog(connection)
     axis = spans(runs(log.execute))
     found: list[PastWrite] = []
-    for span in cut(axis, request.start_ns, request.end_ns):
+    for span in cut(axis, start_ns, end_ns):
         query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
         found += _of_scans(log.execute(sql.SCANS_OF_PERIOD, query).fetchall())
         found += _of_inspections(log.execute(sql.INSPECTIONS_OF_PERIOD, query).fetchall())
@@ -57,33 +58,41 @@ def observed(connection: Any, request: PeriodRequest) -> PastWrites:
     return PastWrites(log.journal_id, _axis(axis), tuple(found), 0, is_all=True)
 
 
-def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
-    """Return the writes that were recent at a moment."""
+def recent(connection: Any, at_ns: int) -> tuple[PastWrite, ...]:
+    """Return the writes that were recent at a moment, ns of ROS time: see `RECENT_COUNT`.
+
+    They are scans with readings, and inspections that saw flowers, by stamp and number. They are of
+    the run that contains the moment, without the copies that a run begins with.
+    """
     log = SiteLog(connection)
-    span = span_at(runs(log.execute), request.at_ns)
+    span = span_at(runs(log.execute), at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "start": 0, "end": request.at_ns + 1, "more": RECENT_COUNT - 1}
+    query = {"run": span.run.id, "start": 0, "end": at_ns + 1, "more": RECENT_COUNT - 1}
     scans = log.execute(sql.RECENT_SCANS, query).fetchall()
     inspections = log.execute(sql.RECENT_INSPECTIONS, query).fetchall()
-    return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
+    return recent_of([*_of_scans(scans), *_of_inspections(inspections)], at_ns)
 
 
-def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
-    """Return the scans of a period."""
+def scans(
+    connection: Any, since_ns: int, at_ns: int, sensors: Collection[str]
+) -> tuple[PastWrite, ...]:
+    """Return the scans with one of `sensors`, from `since_ns` to `at_ns`, both included.
+
+    They are of the run that contains `at_ns`, without copies, by stamp and number. If there are
+    more than `MAX_SCANS`, none is returned.
+    """
     log = SiteLog(connection)
-    span = span_at(runs(log.execute), request.at_ns)
+    span = span_at(runs(log.execute), at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "start": request.since_ns, "end": request.at_ns + 1}
+    query = {"run": span.run.id, "start": since_ns, "end": at_ns + 1}
     select = f"{sql.SCANS_OF_PERIOD} AND kind = 0 LIMIT {MAX_SCANS + 1}"
     rows = log.execute(select, query).fetchall()
     if len(rows) > MAX_SCANS:
         return ()
-    wanted = {
-        text: not request.sensors.isdisjoint(sensor_names(text))
-        for text in {row[6] for row in rows}
-    }
+    names = frozenset(sensors)
+    wanted = {text: not names.isdisjoint(sensor_names(text)) for text in {row[6] for row in rows}}
     found = _of_scans([row for row in rows if wanted[row[6]]])
     return tuple(sorted(found, key=lambda scan: (scan.stamp_ns, scan.number)))
 

@@ -29,6 +29,11 @@ _STEPS: Final = 20_000
 # How long `close` waits, s, for running queries: the WAL is removed with the last connection.
 _END_S: Final = 1.0
 _CACHE_KB: Final = 8_000
+# Where, or when, to ask while the file is not ours to read.
+_ELSEWHERE: Final = {
+    JournalState.IN_USE: "ask that twin",
+    JournalState.UPGRADING: "ask again after that",
+}
 
 AnswerT = TypeVar("AnswerT")
 # Any function of a connection, which calls `should_stop` between steps of its own.
@@ -97,8 +102,8 @@ class Recall:
             return is_abandoned() or time.monotonic() > until_s
 
         condition = self._condition()
-        if condition.state is JournalState.IN_USE:
-            raise NotRemembered(f"{condition.detail}: ask that twin")
+        if then := _ELSEWHERE.get(condition.state):
+            raise NotRemembered(f"{condition.detail}: {then}")
         path = Path(condition.path)
         try:
             answer = self._run(path, condition.inode, search, should_stop)

@@ -1,8 +1,14 @@
+import { render, screen } from '@testing-library/react';
 import { afterEach, expect, test, vi } from 'vitest';
 
-import { setPush } from './notify';
+import { NotifySettings } from '../ui/alarms/AlarmNotes';
+import { isPushed, setNotify, setPush, startNotify } from './notify';
+import { NO_LOCAL_ALARMS, own } from './own';
 
-afterEach(() => vi.unstubAllGlobals());
+afterEach(() => {
+  vi.unstubAllGlobals();
+  own.set(NO_LOCAL_ALARMS);
+});
 
 /** Sets up a browser with a service worker and a bridge with this key; returns the log of calls. */
 function stage(key: string | null, { known = false, fails = false } = {}): unknown[] {
@@ -40,6 +46,21 @@ test('a browser subscribes with the key of its bridge, which gets the subscripti
   expect(log).toEqual([options, subscribed]);
 });
 
+test('each visit subscribes anew: the push service may have ended the subscription meanwhile', async () => {
+  const log = stage('KEY');
+  vi.stubGlobal('Notification', { permission: 'granted' });
+  vi.stubGlobal('isSecureContext', true);
+  own.set({ ...NO_LOCAL_ALARMS, notify: true });
+  startNotify()();
+  render(<NotifySettings />);
+  // A grower who relies on the phone learns whether the bridge reaches it.
+  screen.getByText(/while this page is open in the background\.$/);
+  await screen.findByText(/Critical alarms also come while it is closed\.$/);
+  expect(log).toEqual([options, subscribed]);
+  await setNotify(false);
+  expect(isPushed.get()).toBe(false);
+});
+
 test('one of another key gives way', async () => {
   const log = stage('KEY', { known: true, fails: true });
   await setPush(true);
@@ -49,14 +70,14 @@ test('one of another key gives way', async () => {
 test('turned off, it is unsubscribed at the browser and the bridge', async () => {
   const log = stage('KEY', { known: true });
   await setPush(false);
-  expect(log).toEqual([{ endpoint: 'https://push.example/1' }, 'unsubscribe']);
+  // The browser first: even if the bridge is unreachable, nothing comes any more.
+  expect(log).toEqual(['unsubscribe', { endpoint: 'https://push.example/1' }]);
 });
 
 test('without Web Push at the bridge, the browser is not subscribed', async () => {
   const log = stage(null);
-  await setPush(true);
-  expect(log).toEqual([]);
+  expect(await setPush(true)).toBe(false);
   vi.stubGlobal('navigator', {});
-  await setPush(true);
+  expect(await setPush(true)).toBe(false);
   expect(log).toEqual([]);
 });

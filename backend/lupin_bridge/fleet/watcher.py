@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
@@ -21,7 +21,7 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, LogReader, Now, Search
+from lupin_bridge.feed.query import Child, LogReader, Now
 from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import (
     LIVE_S,
@@ -52,7 +52,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.journal.writes import notes, writes
-from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.journal_queries import Recall, Search
 from lupin_twin.runtime.workers import ShouldStop
 
 log = logging.getLogger(__name__)
@@ -389,7 +389,7 @@ class WatchChild(Child):
         super().__init__(_WithoutJournal)
         self._watcher: Watcher | None = None
 
-    def _search(self, query: Any, now: Now) -> Search:  # noqa: ARG002  # it is of now
+    def _search(self, query: Any, now: Now) -> Search[Any]:  # noqa: ARG002  # it is of now
         return lambda *_: self._look(query)
 
     def _look(self, settings: Settings) -> News:
@@ -407,9 +407,7 @@ class WatchChild(Child):
 
 
 class _WithoutJournal(Recall):
-    def _answer(
-        self, query: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
-    ) -> AnswerT:
+    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
         return query(None, is_abandoned)
 
 

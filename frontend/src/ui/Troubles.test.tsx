@@ -100,7 +100,11 @@ const journal = (over: Partial<Journal>): void => {
 
 test.each([
   // Not every failure is a full disk: some ask for a restart of the twin, in their own words.
-  ['failing', 'Recording has failed.', /If the disk is full, free space; if it is read-only, make it writable/],
+  [
+    'failing',
+    'Recording has failed.',
+    /If the disk is full, free space; if it is read-only, make it writable/,
+  ],
   ['slow', 'Recording is behind.', /Data waits in memory/],
   ['upgrading', 'The recording of an older version is being upgraded.', /which may take minutes/],
   [

@@ -218,12 +218,19 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
         expect_in_reach(hmi, ".map-controls button, .legend, tbody tr, .health button")
         assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
         assert size != (1440, 900) or map_.right > 1.2 * narrow
-    # Its card is below the table; in one pane, nothing changes.
-    hmi.turn("tag=1")
+    hmi.resize(*UPRIGHT[1])
+    show(hmi, "Map")
+    map_, table = places(hmi, ".map-panel", ".list")
+    assert (map_.left, map_.bottom) == (table.left, table.top - 1)
+    expect_in_reach(hmi, ".map-controls button, .legend, tbody tr")
+    # The tag's card takes the table's place; a phone shows one of the three.
+    hmi.row("1").click()
     expect(hmi.card("1")).to_be_visible()
-    assert place(hmi.card("1")).left == place(hmi.page.locator(".list")).left
+    expect(hmi.page.locator(".list")).to_be_hidden()
+    hmi.turn("")
     hmi.resize(*SIZES[0])
     show(hmi, "Tags")
+    expect(hmi.map).to_be_hidden()
     status, table = places(hmi, ".health", ".list")
     assert (status.left, status.bottom) == (table.left, table.top)
 

@@ -167,7 +167,8 @@ bench-live: setup ## benchmark of the live bridge with up to 5,000 clients
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench bench_live
 
 soak: setup ## endurance: 50 kills under load, of the archive too, and eight hours of writing
-	@$(TEST_ENV) KILLS=50 $(BIN)/pytest -s tests/soak_hours.py tests/test_live_memory.py \
+	@$(TEST_ENV) KILLS=50 $(BIN)/pytest -s tests/soak_hours.py \
+	  tests/test_live_disk.py::test_a_killed_twin_knows_everything_shown_100_ms_before \
 	  tests/test_live_archive.py::test_kills_at_any_moment_lose_and_double_nothing
 
 clean: ## remove everything that setup and builds have created

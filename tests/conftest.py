@@ -17,9 +17,8 @@ import httpx
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.support.domains import own_domain
+from tests.support.domains import own_domain, remove_what_the_dead_left
 from tests.support.needs import let_nothing_in
-from tests.support.shared_memory import remove_what_the_dead_left
 from tests.support.state_home import use_own
 
 if TYPE_CHECKING:
@@ -90,13 +89,11 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 
 @pytest.fixture(autouse=True)
 def state(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A state folder per test: no test sees the state of another."""
     monkeypatch.setenv("XDG_STATE_HOME", tempfile.mkdtemp(dir=STATE))
 
 
 @pytest.fixture
 def domain() -> Iterator[int]:
-    """A ROS domain of the test's own."""
     with own_domain() as leased:
         yield leased
 

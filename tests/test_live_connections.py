@@ -33,7 +33,6 @@ def plain() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def secret(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """With a token, and over TLS."""
     files = certificate(tmp_path_factory.mktemp("tls"))
     options = (*limits(client_timeout_s=TIMEOUT_S), *files.options)
     with served(*options, trust=files.trust, afresh=True, LUPIN_TOKEN=TOKEN) as running:
@@ -46,8 +45,6 @@ def requested(*lines: bytes, version: bytes = b"1.1") -> bytes:
     head = b"GET /ws/state HTTP/" + version + b"\r\n" + UPGRADE
     return head + b"".join(line + b"\r\n" for line in lines) + b"\r\n"
 
-
-# --- handshakes ---------------------------------------------------------------------------------
 
 NO_HANDSHAKES = {
     "a body": requested(b"Content-Length: 1"),
@@ -94,9 +91,6 @@ def test_an_unfinished_tls_handshake_ends_after_the_timeout(secret: Served) -> N
     assert peak_mb(secret.process.pid) - before_mb < MEMORY_MB
 
 
-# --- heads --------------------------------------------------------------------------------------
-
-
 def head_of(length: int, line: int) -> bytes:
     """A whole request of that many bytes, with header lines of `line` bytes each."""
     head = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
@@ -125,8 +119,6 @@ def test_pipelined_requests_are_all_answered(plain: Served) -> None:
     received = raw_http.answer(plain.url, one * 20 + last)
     assert (received.count(b"HTTP/1.1 200"), received.count(b"HTTP/1.1")) == (20, 21)
 
-
-# --- floods before authentication ---------------------------------------------------------------
 
 # Read and parsed, this would take seconds.
 FLOOD_BYTES = 16_000_000
@@ -176,8 +168,6 @@ def test_a_body_is_refused_and_not_read(
         assert cpu_s(live.process.pid) - before_s < FLOOD_CPU_S
 
 
-# --- refusals that are not read -----------------------------------------------------------------
-
 REFUSED = {
     "401": b"GET /api/state HTTP/1.1\r\n" + HOST,
     "401, HEAD": b"HEAD /api/state HTTP/1.1\r\n" + HOST,
@@ -209,8 +199,6 @@ def test_a_client_that_reads_no_refusal_is_gone_after_the_timeout(
         wait_for(lambda: open_files(pid) <= files, "their end")
         assert peak_mb(pid) - memory < MEMORY_MB
 
-
-# --- from one protocol to the other -------------------------------------------------------------
 
 LARGE_FIELD = (
     b"GET /api/field.npy?sensor_type=co2&resolution=0.01&bbox_min_x=0&bbox_min_y=0"

@@ -1,10 +1,15 @@
-"""`lupin-twin serve` and a real broker: its messages, its will, and a shutdown in time."""
+"""Real processes notify: a broker, a webhook, and shift reports."""
 
+import re
+import shutil
 import signal
 from pathlib import Path
 from typing import Any
 
+from lupin_bridge.stream.routes_schema import ShiftReport
 from tests.support.domains import own_domain
+from tests.support.http_answers import HOUR, OPTIONS, T0
+from tests.support.journal_answers import JOURNALS
 from tests.support.messages import inspection, scan
 from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
@@ -12,7 +17,7 @@ from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.receiver import receiver, status
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import bridge, filled
+from tests.support.web import Bridge, bridge, filled
 
 READING = "farm/gh1/tags/a_2Fb/readings/temperature"
 
@@ -98,3 +103,111 @@ def test_the_first_webhook_of_web_names_the_source(tmp_path: Path) -> None:
         with lupin_twin(domain, "web", *to, **secrets):
             wait_for(lambda: hook.posted, "the alarm")
     assert hook.posted[0].json["origin"] == "robot"
+
+
+DAY = f"from={T0 - HOUR}&to={T0 + 15 * HOUR}"
+STORED = ("--ros-args", "-p", "journal_days:=36500")
+
+
+def test_a_report_covers_its_period_and_an_invalid_one_is_refused(tmp_path: Path) -> None:
+    """`test_live_same_answers` compares `serve`, `web` and a fleet."""
+    journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
+    with bridge(*OPTIONS, *STORED, "-p", f"journal:={journal}") as live:
+        wait_for(lambda: live.json("/api/alarms")["source"] == "journal", "the alarms")
+        check(live)
+        check_refusals(live)
+
+
+def check(live: Bridge) -> None:
+    answer = live.http.get(f"/api/report?{DAY}")
+    report = ShiftReport.model_validate_json(answer.content)
+    found = live.json(f"/api/timeline?{DAY}")
+    for name, mine in (("scans", "scans"), ("failures", "failed"), ("looks", "inspections")):
+        counted = sum(bucket[name] for bucket in found["buckets"])
+        assert counted == getattr(report.counts, mine) > 0
+    assert report.complete_to == report.to
+    assert answer.headers["x-complete-to"] == f"{report.to.sec}.000000000"
+    # As of then; the current alarms have gone on since.
+    then = {it["id"]: it for it in live.json(f"/api/alarms?{DAY}")["alarms"]}
+    reported = {it.id: it for it in report.alarms}
+    assert reported.keys() == then.keys()
+    for alarm_id, alarm in reported.items():
+        assert alarm.raised_at.model_dump() == then[alarm_id]["raised_at"]
+
+    def is_known() -> bool:
+        etag = live.get(f"/api/report?{DAY}").headers["etag"]
+        return live.get(f"/api/report?{DAY}", {"If-None-Match": etag}).status_code == 304
+
+    wait_for(is_known, "an answer that is not sent twice")
+    page = live.http.get(f"/api/report.html?{DAY}&lang=de")
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; style-src")
+    assert "<script" not in page.text
+    assert 'lang="de"' in page.text
+    assert "(UTC+00:00)" in page.text
+    assert "\u00a0°C" in page.text
+    assert re.search(r"\d,\d\u00a0°C", page.text)
+    assert not re.search(r"\d[.,]\d\d+\u00a0°C|\d\.\d\u00a0°C", page.text)
+
+
+def check_refusals(live: Bridge) -> None:
+    for query, message in (
+        (f"from={T0}&to={T0 - 1}", "must be before to"),
+        (f"from={T0}&to={T0}", "must be before to"),
+        (f"from={T0 - 31 * 24 * HOUR - 1}&to={T0}", "31.0 days apart, the limit is 31"),
+        (f"from={T0 - 3652 * 24 * HOUR}&to={T0}", "3652.0 days apart, the limit is 31"),
+        ("from=yesterday", "from is 'yesterday'"),
+        ("from=1&from=2", "from"),
+        (f"to={T0}&lang=de", "lang"),
+    ):
+        answer = live.http.get(f"/api/report?{query}")
+        assert (answer.status_code, message in answer.text) == (400, True), answer.text
+    answer = live.http.get(f"/api/report.html?to={T0}&lang=fr")
+    assert (answer.status_code, "lang" in answer.json()["detail"]) == (400, True)
+    html = {"Accept": "text/html,*/*;q=0.8"}
+    page = live.http.get("/api/report.html?from=<b>&lang=de", headers=html)
+    assert (page.status_code, page.headers["content-type"]) == (400, "text/html; charset=utf-8")
+    assert "Kein Bericht" in page.text
+    assert "from is &#x27;&lt;b&gt;&#x27;" in page.text
+    assert '<a href="">Erneut versuchen</a>' in page.text
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; style-src")
+    for zone in ("Mars", "Europe", "../zone.tab", "/etc/localtime", "a" * 300):
+        answer = live.http.get(f"/api/report.html?to={T0}&time_zone={zone}")
+        assert (answer.status_code, "times are in UTC" in answer.text) == (200, True), zone
+    # The future is left out, and a shift is eight hours.
+    report = live.json(f"/api/report?to={2**31 - 1}")
+    assert report["to"]["sec"] - report["from"]["sec"] == 8 * HOUR
+    assert report["to"]["sec"] < 2**31 - 1
+
+
+def test_the_report_of_a_day_is_posted_once_also_after_restarts(tmp_path: Path) -> None:
+    secret: Any = {"LUPIN_WEBHOOK_SECRET": "s" * 16}
+    with receiver(status(200)) as hook:
+        options = (
+            *("--report-at", "00:00", "--time-zone", "UTC"),
+            *("--webhook-url", f"http://127.0.0.1:{hook.port}/"),
+            *("--accounts", str(tmp_path / "accounts.sqlite")),
+            *("--ros-args", "-p", f"journal:={tmp_path / 'j.sqlite'}"),
+        )
+
+        def sent() -> Path | None:
+            return next(iter(tmp_path.glob("report-*.sent")), None)
+
+        with bridge(*options, **secret) as live:
+            live.peer.wait_for_twin()
+            live.peer.observe(scan("a", {"temperature": 21.5}))
+            note = wait_for(sent, "the note")
+            assert note is not None
+        midnight_ns = int(note.read_text())
+        assert midnight_ns % (86_400 * 10**9) == 0
+        assert hook.posted == []
+        note.write_text(str(midnight_ns - 86_400 * 10**9))
+        with bridge(*options, **secret) as live:
+            wait_for(lambda: hook.posted, "the report of the day that was missed")
+            wait_for(lambda: int(note.read_text()) == midnight_ns, "the note of it")
+            period = f"from={midnight_ns // 10**9 - 86_400}&to={midnight_ns // 10**9}"
+            posted = hook.posted[0].json
+            assert posted["change"] == "report"
+            assert posted["report"] == live.json(f"/api/report?{period}")
+        with bridge(*options, **secret) as live:
+            wait_for(lambda: live.json("/api/alarms")["source"] == "journal", "a start")
+        assert len(hook.posted) == 1

@@ -100,17 +100,13 @@ def test_a_past_state_has_the_data_and_the_ages_of_its_moment(peer: Peer) -> Non
     [times] = [times for times in response.times.tags if times.tag_id == "a"]
     assert list(times.observed_at) == [stamp(T), stamp(T)]
     assert times.looked_at == times.last_try == stamp(T + 10.0)
-
-
-def test_a_later_moment_has_later_readings_the_failed_attempt_and_no_pest(peer: Peer) -> None:
-    response = state_at(peer, T + 300.0)  # a moment includes observations exactly at it
-    a = next(tag for tag in response.state.tags if tag.tag_id == "a")
-    assert {r.name: r.value for r in a.readings} == {"co2": 500.0, "light": 9.0}
-    assert (a.anomaly, a.stale_seconds) == (False, 0.0)
-    before = state_at(peer, T + 299.5)
+    before, at_it = (state_at(peer, T + moment_s) for moment_s in (299.5, 300.0))
     times = next(times for times in before.times.tags if times.tag_id == "a")
     assert (times.last_try, times.last_try_status) == (stamp(T + 110.0), 2)
-    assert next(tag for tag in before.state.tags if tag.tag_id == "a").anomaly
+    # A moment includes observations exactly at it: of no pest any more.
+    seen = [next(tag for tag in it.state.tags if tag.tag_id == "a") for it in (before, at_it)]
+    assert [tag.anomaly for tag in seen] == [True, False]
+    assert seen[1].stale_seconds == 0.0
 
 
 def test_as_of_now_it_is_the_current_state(peer: Peer) -> None:

@@ -78,7 +78,6 @@ def at(live: Bridge, x: float) -> Json | None:
 
 
 def until_at(live: Bridge, x: float) -> Json:
-    """The same, awaited."""
     reported = live.peer.until(lambda: at(live, x), f"the robot at {x} m")
     assert reported is not None
     return reported

@@ -82,7 +82,6 @@ def vanish(client: socket.socket) -> None:
 
 
 def trickle(client: socket.socket) -> None:
-    """Read one byte of what there is."""
     client.settimeout(0)
     with suppress(OSError):
         client.recv(1)

@@ -1,4 +1,4 @@
-"""Package metadata for a robot's tools: dependencies that are really used, files that exist."""
+"""Package metadata, the targets of the Makefile, and the lengths of hand-written files."""
 
 import ast
 import json
@@ -208,3 +208,71 @@ def test_all_of_a_package_is_installed_where_ros2_looks_and_runs(
         command = [str(prefix / "lib" / package / "adapt"), "--help"]
         reported = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
         assert "usage: adapt [-h] [--config FILE] [--check]" in reported.stdout
+
+
+MAX_LINES = 450
+HAND_WRITTEN = {
+    "backend": ("*.py", "*.html", "*.css", "*.js"),
+    "ros_node": ("*.py",),
+    "tests": ("*.py", "*.mjs", "*.js"),
+    "frontend/src": ("*.ts", "*.tsx", "*.css"),
+    "frontend/scripts": ("*.mjs",),
+}
+# Generated, or built.
+NOT_BY_HAND = (
+    "frontend/src/contract/openapi.gen.ts",
+    "backend/lupin_bridge/static/",
+    "backend/lupin_bridge/guide/",
+)
+
+
+def test_no_hand_written_file_is_too_long() -> None:
+    long = {}
+    for folder, patterns in HAND_WRITTEN.items():
+        for file in (file for pattern in patterns for file in (ROOT / folder).rglob(pattern)):
+            path = file.relative_to(ROOT).as_posix()
+            lines = len(file.read_text(encoding="utf-8").splitlines())
+            if lines > MAX_LINES and not path.startswith(NOT_BY_HAND):
+                long[path] = lines
+    assert long == {}, f"more than {MAX_LINES} lines"
+
+
+def commands_of(*target: str) -> str:
+    """The commands of a target, none of them run."""
+    own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
+    result = subprocess.run(
+        ["make", "--dry-run", "--no-print-directory", *target],
+        capture_output=True, text=True, check=True, cwd=ROOT,
+        env={name: value for name, value in os.environ.items() if name not in own},
+    )  # fmt: skip
+    return result.stdout
+
+
+def test_every_check_is_part_of_make_test_and_two_run_at_a_time() -> None:
+    lines = commands_of("test")
+    for command in (
+        "ruff check",
+        "ruff format --check",
+        "lint-imports",
+        "npm run --silent lint\n",  # of all files
+        "npm run --silent format:check",
+        "mypy",
+        "npm run --silent typecheck",
+        "npm run --silent types:check",
+        "npm run --silent test",
+        "npm run --silent size",
+        "pytest",
+        "-j 2 --output-sync=target lint types docs hmi-test collect",
+    ):
+        assert command in lines
+    assert "-j 2 --output-sync=target quick lint types hmi-test" in commands_of("check")
+
+
+def test_a_warning_ends_the_build_of_the_guide() -> None:
+    assert "sphinx-build --quiet -n -W " in commands_of("--what-if=docs/conf.py", "docs")
+
+
+def test_processes_of_the_tests_compile_no_module_again() -> None:
+    lines = [line for line in commands_of("test", "quick").splitlines() if "/pytest " in line]
+    assert len(lines) == 3
+    assert all(line.startswith("PYTHONDONTWRITEBYTECODE= ") for line in lines)

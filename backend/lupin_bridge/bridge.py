@@ -79,7 +79,7 @@ class Bridge:
         self.workers = source.workers
         self.site = settings.site
         self.limits = limits
-        self.liveness = Liveness(lambda: source.world)
+        self.liveness = Liveness(lambda: source.world, lambda: source.problems)
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache

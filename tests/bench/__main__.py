@@ -16,17 +16,13 @@ BENCHES = (
     "bench_log",
     "bench_alarms",
     "bench_page",
-    "bench_greenhouse",
     "bench_import",
-    "bench_forward",
     "bench_fleet",
     "bench_overview",
-    "bench_replicas",
 )
 
 
 def main() -> int:
-    """Run the benchmarks named on the command line, or all."""
     use_own()
     # As in the twin, and before anything imports numpy.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"

@@ -14,7 +14,7 @@ from random import Random
 from lupin_bridge.alarms.feed import LOT
 from lupin_bridge.judge.alarm_fold import REACH_COUNT, AlarmFold
 from lupin_twin.core.past import PastWrite, RunSpan
-from tests.support.ordinary_day import DAY_NS, S, ordinary_days
+from tests.support.climate import DAY_NS, S, ordinary_days
 from tests.support.proc_stat import resident_mb
 from tests.support.seen import BY_LIGHT
 
@@ -105,7 +105,6 @@ def ordinary() -> None:
 
 
 def main() -> None:
-    """Print all of it."""
     print(f"\n{'tags':>7}  {'five sensors each':<44}{'ms':>12}{'at most':>12}")
     for tags in SIZES:
         alarms_of(tags)

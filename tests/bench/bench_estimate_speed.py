@@ -8,7 +8,8 @@ from typing import TypeVar
 from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import Posterior
-from tests.support.estimates import DAY_S, many_tags
+from tests.bench.bench_estimate_many import greenhouse
+from tests.bench.other_worlds import DAY_S
 
 Made = TypeVar("Made")
 # Tags, readings of each, m of the greenhouse's side, cells of a side.
@@ -33,7 +34,7 @@ def best(make: Callable[[], Made], times: int = 7) -> tuple[float, Made]:
 
 def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
     """A fit; a posterior, until its first value; a grid."""
-    readings = many_tags(tags, each, metres)
+    _, readings = greenhouse(tags, metres, 0, each)
     at_s = float(readings.time_s.max())
     readings = thinned(readings, at_s, DAY_S)
     box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": metres, "bbox_max_y": metres}

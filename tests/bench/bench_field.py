@@ -67,7 +67,6 @@ def loop_seconds(samples: Sequence[FieldSample], side: float, cells: int) -> tup
 
 
 def main() -> None:
-    """Print the table."""
     print(f"Python {sys.version.split()[0]}, numpy {np.__version__}")
     print("fields (falloff and gate 1.5 m, power 2); ~ extrapolated from some of the cells")
     for count, side, cells in (

@@ -24,9 +24,7 @@ import psycopg
 
 from lupin_bridge.archive.forwarding import Forwarder, Sink
 from lupin_bridge.archive.journal_reader import Batch, Epoch
-from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.queries import series
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog
 from tests.bench.journal_double import BEGUN_NS, Greenhouse, filled
@@ -40,9 +38,11 @@ SENSORS = ("temperature", "humidity", "co2", "light", "moisture")
 WARM_S, MEASURED_S = 15.0, 20.0
 HOUR = 3_600 * SECOND
 DAY = Greenhouse(tags=TAGS, days=1.0, every_s=120.0, inspection_days=0.0, failing=0)
-
-
-# --- lag ------------------------------------------------------------------------------------------
+# Of all tables, with their indexes, bytes.
+SIZE = (
+    "SELECT sum(pg_total_relation_size(oid)) FROM pg_class WHERE relkind = 'r'"
+    " AND relnamespace = 'public'::regnamespace"
+)
 
 
 class _TimedSink(Sink):
@@ -51,7 +51,6 @@ class _TimedSink(Sink):
     lags: list[tuple[float, float]] = []  # noqa: RUF012  # one for all
 
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
-        """Append a batch."""
         put = super().put(batch, epoch)
         now_ns = time.time_ns()
         lags = [(now_ns / 1e9, (now_ns - row[5]) / 1e9) for row in batch.rows.get("scan", ())]
@@ -91,7 +90,6 @@ class _Twin:
         (self._seq,) = self._connection.execute("SELECT max(seq) FROM scan").fetchone()
 
     def record(self) -> None:
-        """Write them in one transaction."""
         now_ns = time.time_ns()
         self._connection.execute("BEGIN")
         self._connection.executemany(
@@ -117,7 +115,6 @@ def record(twins: Sequence[_Twin], seconds: float) -> float:
 
 
 def lag(sites: int) -> None:
-    """Print how far the archive is behind."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         archive = Archive(stack.enter_context(server(fsync=True, connections=sites + 20)), "gh0")
@@ -148,19 +145,13 @@ def lag(sites: int) -> None:
     )
 
 
-# --- growth ---------------------------------------------------------------------------------------
-
-
 def measure(archive: Archive, sites: int, days: int) -> None:
     """Print rows, bytes, and how long queries take."""
     chance, end_ns = random.Random(7), replace(DAY, days=float(days)).end_ns
     with psycopg.connect(archive.owner, autocommit=True) as connection:
         connection.execute("VACUUM ANALYZE")
-        ((size,),) = connection.execute(
-            "SELECT sum(pg_total_relation_size(oid)) FROM pg_class WHERE relkind = 'r'"
-            " AND relnamespace = 'public'::regnamespace"
-        ).fetchall()
-        states, past = [], []
+        ((size,),) = connection.execute(SIZE).fetchall()
+        states = []
         for _ in range(40):
             log = SiteLog(connection, f"gh{chance.randrange(sites)}")
             at_ns = BEGUN_NS + HOUR + int(chance.random() * (end_ns - BEGUN_NS - 2 * HOUR))
@@ -168,22 +159,18 @@ def measure(archive: Archive, sites: int, days: int) -> None:
             found = state_at(log, at_ns, "map")  # type: ignore[arg-type]  # queries are of both
             states.append((time.perf_counter() - start) * 1e3)
             assert len(found.tags) == TAGS, len(found.tags)
-            requested = SeriesRequest("7", "co2", BEGUN_NS, end_ns, 500)
-            start = time.perf_counter()
-            series(log, requested, end_ns)
-            past.append((time.perf_counter() - start) * 1e3)
     rows = sites * days * DAY.scans * TAGS
     print(
         f"{sites:>5}{days:>6}{rows:>12,}{float(size) / 1e6:>9.0f}{float(size) / rows:>8.0f}"
-        f"{min(states):>13.1f}{statistics.median(states):>9.1f}{min(past):>12.1f}",
+        f"{min(states):>13.1f}{statistics.median(states):>9.1f}",
         flush=True,
     )
 
 
 def growth() -> None:
-    """Print how the archive grows with days and with sites; for a sensor the least time too, ms."""
+    """Print how the archive grows with days and with sites."""
     print(
-        "sites  days       scans       MB  B/scan  state ms: least, median  a sensor, all days",
+        "sites  days       scans       MB  B/scan  state ms: least, median",
         flush=True,
     )
     with server(fsync=True) as postgresql:
@@ -200,8 +187,21 @@ def growth() -> None:
             done = sites
 
 
+def week() -> None:
+    """Print how long a week of a site that was offline takes, a process's start included."""
+    journal = filled(replace(DAY, days=7.0))
+    with server(fsync=True) as postgresql:
+        archive = Archive(postgresql)
+        begun_s = time.monotonic()
+        forward_once(archive, journal.path)
+        took_s = time.monotonic() - begun_s
+        ((size,),) = archive.select(SIZE)
+    rate, share = journal.readings / took_s, float(size) / (7 * DAY.scans * TAGS)
+    print(f"a week: {journal.readings:,} readings, {rate:,.0f} a second, {share:.0f} B/scan")
+
+
 def main() -> None:
-    """Print the figures."""
+    week()
     lag(200)
     growth()
 

@@ -21,7 +21,6 @@ sensors: {temperature: temp_c, humidity: {column: rh, factor: 100, min: 0, max: 
 
 
 def main() -> None:
-    """Print the figures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "columns.yaml").write_text(MAP)

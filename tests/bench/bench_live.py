@@ -84,7 +84,6 @@ def asking(port: int, days: int) -> Iterator[Counter[int]]:
 
 
 def measure_load(server: Server, load: Load) -> list[str]:
-    """One row of the table."""
     past = asking(server.port, load.days) if load.asks else nullcontext(Counter[int]())
     with Clients(server.port, load.clients, load.path) as clients, past as answers:
         joined_s = clients.joined_s()

@@ -41,7 +41,6 @@ TIMELINE: Final = (
 
 
 def main() -> None:
-    """Print the selected figures."""
     with tempfile.TemporaryDirectory(prefix="lupin-twin-log-") as folder:
         write(Path(folder))
     request(filled(YEAR), filled(MANY))

@@ -54,7 +54,6 @@ class Greenhouse:
         return int(self.days * DAY_S / self.every_s)
 
     def rows(self) -> Iterator[Write]:
-        """All observations, by time."""
         step_ns = int(self.every_s * SECOND / self.tags)
         ids = [str(number + 1) for number in range(self.tags)]
         inspections_every = max(1, int(self.inspection_days * DAY_S / self.every_s))
@@ -98,8 +97,6 @@ def _inspection(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
 
 @dataclass(frozen=True)
 class Filled:
-    """A journal, and its content."""
-
     path: Path
     greenhouse: Greenhouse
     readings: int

@@ -42,8 +42,6 @@ class Stream:
 
 
 class Clients:
-    """All clients of this process and what they received."""
-
     def __init__(self, path: str, port: int) -> None:
         self._path, self._port = path, port
         self._poll = select.epoll()

@@ -111,7 +111,6 @@ class Server:
 
     @property
     def pids(self) -> list[int]:
-        """The server and its child processes."""
         return [self.process.pid, *children_of(self.process.pid, b"")]
 
     def cpu_s(self) -> float:
@@ -119,7 +118,6 @@ class Server:
         return sum(map(cpu_s, self.pids))
 
     def memory_mb(self) -> float:
-        """Memory of the server and its child processes, MB."""
         return sum(map(proportional_mb, self.pids))
 
 

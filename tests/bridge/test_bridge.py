@@ -38,6 +38,7 @@ class Script:
     """A source that reports what the test makes it report. Real sources have their own tests."""
 
     world = World()
+    problems: tuple[str, ...] = ()
 
     def __init__(self) -> None:
         self.tell: Callable[[TwinUpdate], None]

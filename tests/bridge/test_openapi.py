@@ -138,7 +138,6 @@ def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
 
 
 def names(message_type: Any) -> list[str]:
-    """The fields of a ROS message, in their order."""
     return list(message_type.get_fields_and_field_types())
 
 

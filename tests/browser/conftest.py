@@ -68,7 +68,6 @@ def chromium() -> Iterator[Browser]:
 # same worker call asyncio.run().
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """A headless Chromium with an empty profile."""
     expect.set_options(timeout=PATIENCE_S * 1000)
     with chromium() as launched:
         yield launched
@@ -135,7 +134,6 @@ def open_page(browser: Browser) -> Iterator[OpenPage]:
 
 @pytest.fixture
 def hmi(greenhouse: Bridge, open_page: OpenPage) -> Hmi:
-    """A page that shows the whole greenhouse."""
     page = open_page(greenhouse.url)
     page.expect_rows(*TAGS)
     page.expect_samples(3)

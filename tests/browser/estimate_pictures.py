@@ -92,13 +92,11 @@ class Robot:
 
 
 def message_of(row: Scan) -> Any:
-    """The robot's observation."""
     readings = {each.name: each.value for each in row.readings}
     return scan(row.tag_id, readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
 
 
 def is_reported(row: Scan, tag: dict[str, Any]) -> bool:
-    """Whether the twin knows the scan."""
     attempted = filled(tag)["last_try"]
     return attempted is not None and attempted["sec"] >= row.stamp_ns // SECOND
 

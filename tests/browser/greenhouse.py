@@ -29,7 +29,6 @@ def observations() -> list[Any]:
 
 
 def furnish(bridge: Bridge) -> None:
-    """Publish all of it to a bridge's twin."""
     bridge.peer.publish_map(occupancy_grid([[100] * 6, *([[100, 0, 0, 0, 0, 100]] * 4), [100] * 6]))
     bridge.peer.discover(discovered({"seen": pose(4, 2)}))
     bridge.peer.observe(*observations())

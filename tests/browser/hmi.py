@@ -82,8 +82,6 @@ class Hmi:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("websocket", on_websocket)
 
-    # --- navigation -------------------------------------------------------------------------
-
     def go(self, fragment: str = "", query: str = "") -> None:
         """Load the page anew; a permalink's fragment comes without its `#`."""
         if self.page.url.partition("#")[0] == f"{self.url}/{query}":
@@ -108,7 +106,6 @@ class Hmi:
         )
 
     def address(self) -> str:
-        """The current address."""
         address = self.page.evaluate("location.href")
         assert isinstance(address, str)
         return address
@@ -131,8 +128,6 @@ class Hmi:
             if urlsplit(url).netloc != own and not url.startswith(("blob:", "data:", "about:"))
         ] == []
 
-    # --- content ----------------------------------------------------------------------------
-
     @property
     def app(self) -> Locator:
         return self.page.get_by_test_id("app")
@@ -151,7 +146,6 @@ class Hmi:
         return self.page.get_by_test_id(name)
 
     def row(self, tag_id: str) -> Locator:
-        """A tag's row of the table."""
         return self.page.locator(f"tr[data-tag-id={json.dumps(tag_id)}]")
 
     def cell(self, tag_id: str, sensor: str) -> Locator:
@@ -206,8 +200,6 @@ class Hmi:
         """The page opens in the colours of the ideal range."""
         self.open_details()
         self.page.get_by_role("radio", name="Value").check()
-
-    # --- the map, pixel by pixel ------------------------------------------------------------
 
     @property
     def map(self) -> Locator:
@@ -311,8 +303,6 @@ class Hmi:
         left, top = self.view().pixel(x, y)
         self.map.hover(position={"x": left, "y": top})
 
-    # --- the keyboard -----------------------------------------------------------------------
-
     def tab_to(self, target: Locator) -> None:
         """Reach an element with the Tab key alone."""
         for _ in range(80):
@@ -388,7 +378,6 @@ def open_hmi(
 
 
 def slider(hmi: Hmi) -> Locator:
-    """The slider of the time bar."""
     return hmi.page.get_by_role("slider", name="Time shown")
 
 

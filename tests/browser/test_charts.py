@@ -97,18 +97,15 @@ class Garden:
 
 @pytest.fixture(scope="module")
 def garden() -> Iterator[Garden]:
-    """A bridge with two hours of past."""
     with bridge() as running:
         yield Garden(running)
 
 
 def queries(hmi: Hmi) -> list[dict[str, str]]:
-    """The page's queries of the past of sensors."""
     return [dict(parse_qsl(urlsplit(url).query)) for url in hmi.requests if "/api/history?" in url]
 
 
 def requested(hmi: Hmi, sensor: str = "temperature") -> dict[str, str]:
-    """The page's last query of a sensor's past."""
     return [each for each in queries(hmi) if each["sensor_type"] == sensor][-1]
 
 

@@ -126,10 +126,13 @@ def test_the_label_of_now_has_one_line_of_the_time_bar(
     hmi = open_page(greenhouse.url, query="?lang=es", viewport={"width": 1100, "height": 800})
     now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
+    hmi.expect_layout()
     assert place(now).bottom - place(now).top < 24
     # A moment of the past takes two, beside the choices.
     hmi.go("at=1795970265", "?lang=de")
     expect(now).to_contain_text("Nov.")
+    hmi.expect_parts()
+    hmi.view()
     assert words_below(hmi, ".timebar-when", ".timebar-period") == []
 
 
@@ -139,6 +142,7 @@ def test_the_legend_is_one_line_and_its_details_open_over_the_map(
     for language, width in (*((each, 1100) for each in LANGUAGES), ("de", 1440)):
         viewport = {"width": width, "height": 900}
         hmi = open_page(greenhouse.url, query=f"?lang={language}", viewport=viewport)
+        hmi.expect_layout()
         scale = place(hmi.test_id("ideal-scale"))
         assert scale.bottom - scale.top < 36, f"{language}: one line below the colours"
         for line in (
@@ -214,12 +218,19 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
         expect_in_reach(hmi, ".map-controls button, .legend, tbody tr, .health button")
         assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
         assert size != (1440, 900) or map_.right > 1.2 * narrow
-    # Its card is below the table; in one pane, nothing changes.
-    hmi.turn("tag=1")
+    hmi.resize(*UPRIGHT[1])
+    show(hmi, "Map")
+    map_, table = places(hmi, ".map-panel", ".list")
+    assert (map_.left, map_.bottom) == (table.left, table.top - 1)
+    expect_in_reach(hmi, ".map-controls button, .legend, tbody tr")
+    # The tag's card takes the table's place; a phone shows one of the three.
+    hmi.row("1").click()
     expect(hmi.card("1")).to_be_visible()
-    assert place(hmi.card("1")).left == place(hmi.page.locator(".list")).left
+    expect(hmi.page.locator(".list")).to_be_hidden()
+    hmi.turn("")
     hmi.resize(*SIZES[0])
     show(hmi, "Tags")
+    expect(hmi.map).to_be_hidden()
     status, table = places(hmi, ".health", ".list")
     assert (status.left, status.bottom) == (table.left, table.top)
 
@@ -398,11 +409,11 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
         hmi.go(query=f"?lang={language}")
         expect(hmi.test_id("sample-count")).to_contain_text(contribute)
         expect(hmi.page.locator("html")).to_have_attribute("lang", language)
+        hmi.expect_layout()
         assert hmi.page.evaluate(_TOO_LONG) == []
         # "Since" shares the last line of what to do first, or has no room.
         todo, since = places(hmi, ".health-strip .do-what strong", ".health-strip small")
         assert since.top < todo.bottom, language
-        hmi.expect_parts()
         hmi.page.locator(".menu > button").click()
         expect(hmi.test_id("language")).to_have_value(language)
         assert hmi.page.evaluate(_TOO_LONG) == []

@@ -49,7 +49,7 @@ def test_the_page_renders_few_rows_and_shows_any(open_greenhouse: OpenGreenhouse
     frame = hmi.page.locator(".table-scroll")
     # As wide as its place, with the gaps for the rows that are not rendered.
     table, last = hmi.page.get_by_role("table"), hmi.page.locator("thead th:visible").last
-    assert place(last).right == place(table).right
+    hmi.expect(lambda: place(last).right == place(table).right, "a head as wide as the table")
     for share, tag_id in ((1.0, str(TAGS)), (0.5, str(TAGS // 2 + 5)), (0.0, "1")):
         frame.evaluate("(e, share) => { e.scrollTop = share * e.scrollHeight; }", share)
         expect(hmi.row(tag_id)).to_be_in_viewport()

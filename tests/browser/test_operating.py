@@ -10,8 +10,6 @@ from tests.browser.hmi import Hmi, OpenPage
 from tests.browser.places import place, places
 from tests.support.web import Bridge
 
-# --- sensors ------------------------------------------------------------------------------------
-
 
 def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: Hmi) -> None:
     for size in ((844, 390), (1280, 600)):
@@ -70,9 +68,6 @@ def test_a_sensor_has_its_colours_texts_legend_and_column(hmi: Hmi) -> None:
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
 
 
-# --- table --------------------------------------------------------------------------------------
-
-
 def test_beside_a_card_the_table_has_rows_and_the_chosen_one_is_not_below_its_head(
     hmi: Hmi,
 ) -> None:
@@ -120,9 +115,6 @@ def test_a_row_and_its_pin_mark_each_other_and_the_card_shows_everything(hmi: Hm
     expect(card.locator("[data-sensor=temperature]")).to_contain_text("high, daytime ideal")
     expect(card).to_contain_text("lupin")
     expect(card).to_contain_text("x 1.00 m, y 3.00 m")
-
-
-# --- map ----------------------------------------------------------------------------------------
 
 
 def _on_page(hmi: Hmi, x: float, y: float) -> tuple[float, float]:
@@ -181,9 +173,6 @@ def test_each_layer_can_be_hidden_and_shown(hmi: Hmi) -> None:
         box.click()
         hmi.expect_picture(with_it)
     assert panel.get_by_role("checkbox").count() == 9
-
-
-# --- the keyboard alone -------------------------------------------------------------------------
 
 
 def test_sensor_layers_zoom_table_and_tag_by_keyboard_alone(hmi: Hmi) -> None:
@@ -276,21 +265,18 @@ def test_help_takes_the_focus_and_no_key_reaches_through_it(hmi: Hmi) -> None:
     expect(hmi.page.get_by_role("searchbox")).to_be_focused()
 
 
-# --- language -----------------------------------------------------------------------------------
-
-
 def test_the_page_uses_the_language_of_the_browser_or_the_address_or_the_menu(
     greenhouse: Bridge, open_page: OpenPage
 ) -> None:
     hmi = open_page(greenhouse.url, "sensor=humidity&tag=1", locale="de-AT")
     expect(hmi.test_id("legend")).to_contain_text("Luftfeuchte")
     expect(hmi.card("1")).to_contain_text("Messpunkt 1")
-    assert hmi.page.evaluate(_BROKEN) == []
+    # A page measures its columns once its font is there.
+    hmi.expect(lambda: hmi.page.evaluate(_BROKEN) == [], "whole words in the heads")
     hmi.page.locator(".menu > button").click()
     hmi.test_id("language").select_option(label="Nederlands")
     expect(hmi.test_id("legend")).to_contain_text("Luchtvochtigheid")
     expect(hmi.card("1")).to_contain_text("Meetpunt 1")
-    # The new page measures its columns once its font is there.
     hmi.expect(lambda: hmi.page.evaluate(_BROKEN) == [], "whole words in the heads")
     stored = {"sensor": ["humidity"], "tag": ["1"]}
     hmi.expect(

@@ -1,4 +1,4 @@
-"""The patrol as its own process, over real DDS."""
+"""The patrol as its own process, over real DDS; its options and its messages."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from math import cos, pi, sin
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
@@ -17,16 +19,20 @@ from builtin_interfaces.msg import Time
 from greenhouse_sim.simulator import GreenhouseSimulator
 from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
+from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
 from lupin_patrol import node
-from lupin_patrol.mission import PassCompleted
+from lupin_patrol.cli import parser
+from lupin_patrol.greenhouse import Rect
+from lupin_patrol.mission import PassCompleted, ScanStatus, Visited, pose_of
 from lupin_patrol.node import PatrolNode
+from lupin_twin.core.state import Bloom, Flower, Inspection, Scan
 from tests.support.domains import ros_env
 from tests.support.inprocess import ros_domain
 from tests.support.processes import Process
 from tests.support.ros import Peer, latched
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, wait_for
 
 OBSERVATIONS = "/floranova/observations"
 DISCOVERED_TAGS = "/perception/discovered_tags"
@@ -229,3 +235,119 @@ def test_its_latch_is_as_deep_as_in_the_contract(domain: int) -> None:
         finally:
             rclpy.try_shutdown()
     assert depths == {OBSERVATIONS: 50, DISCOVERED_TAGS: 1, MAP: 1}
+
+
+STAMP_NS = 12_000_000_034
+POSE = pose_of((1.5, 2.5), pi / 2)
+# Numbers that a float32 holds exactly: sent and received values are equal.
+BLOOM = Bloom(1.5, 2.2, 0.6, 0.25, "lupin", 0.875, anomaly=True)
+BOX = Rect(1.0, 2.0, 2.0, 2.25)
+CORNERS = tuple((x, y, 0.0) for x, y in BOX.corners)
+FLOWER = Flower("lupin", 0.75, True, 12, 3, (BLOOM,), CORNERS)
+FLOWERS = Visited(3.2, 4, 0.0, Inspection("7", 0, FLOWER, POSE))
+
+
+def over_the_wire(message: Any) -> Any:
+    """The received message; a value of the wrong type does not survive this."""
+    received = deserialize_message(serialize_message(message), type(message))
+    assert received == message
+    return received
+
+
+@pytest.mark.parametrize(
+    ("status", "expected"),
+    [
+        (ScanStatus.UNREACHABLE, Observation.STATUS_UNREACHABLE),
+        (ScanStatus.SCAN_FAILED, Observation.STATUS_SCAN_FAILED),
+    ],
+)
+def test_a_failed_scan_has_a_reason_and_no_pose(status: ScanStatus, expected: int) -> None:
+    failed = Visited(3.0, 0, 0.0, Scan("7", 0, (), None, status, "the way is blocked"))
+    message = over_the_wire(node.observation(failed, STAMP_NS, "map"))
+    assert message.status == expected
+    assert message.status_detail == "the way is blocked"
+    assert message.tag_reading.tag_id == "7"
+    assert len(message.tag_reading.readings) == 0
+    # Quaternion.w is 1 by default, which would put the tag at the origin.
+    assert message.tag_pose_in_map.orientation.w == 0.0
+
+
+def test_a_flower_observation() -> None:
+    message = over_the_wire(node.observation(FLOWERS, STAMP_NS, "map"))
+    assert message.kind == Observation.KIND_FLOWER
+    assert message.status == Observation.STATUS_OK
+    assert message.mission_id == "patrol-0005"
+    flower = message.flower
+    assert (flower.tag_id, flower.species) == ("7", "lupin")
+    assert flower.confidence == 0.75
+    assert (flower.anomaly, flower.flower_count, flower.bug_count) == (True, 12, 3)
+    assert (flower.pose.header, flower.pose.pose) == (message.header, message.tag_pose_in_map)
+    # The tag's x axis turns into the aisle.
+    turned = message.tag_pose_in_map.orientation
+    assert (turned.z, turned.w) == pytest.approx((sin(pi / 4), cos(pi / 4)))
+    assert [(p.x, p.y, p.z) for p in flower.box_footprint.points] == [
+        (1.0, 2.0, 0.0),
+        (2.0, 2.0, 0.0),
+        (2.0, 2.25, 0.0),
+        (1.0, 2.25, 0.0),
+    ]
+    [bloom] = flower.flowers
+    assert (bloom.position.x, bloom.position.y) == (BLOOM.x, BLOOM.y)
+    assert bloom.position.z == BLOOM.z
+    assert bloom.height_m == 0.25
+    assert (bloom.species, bloom.anomaly) == ("lupin", True)
+    assert bloom.confidence == 0.875
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "limits"),
+    [
+        ("--speed", "0", "a number from 0.1 to 50"),
+        ("--speed", "nan", "a number from 0.1 to 50"),
+        ("--day-speed", "-0.1", "a number from 0 to 3600"),
+        ("--day-speed", "inf", "a number from 0 to 3600"),
+        ("--since-morning", "86401", "a number from 0 to 86400"),
+        ("--seed", "1.5", "a whole number from 0 to 4294967295"),
+        ("--seed", "-1", "a whole number from 0 to 4294967295"),
+        ("--seed", "4294967296", "a whole number from 0 to 4294967295"),
+    ],
+)
+def test_a_bad_value_is_refused_with_option_value_and_limits(
+    capsys: pytest.CaptureFixture[str], option: str, value: str, limits: str
+) -> None:
+    with pytest.raises(SystemExit) as refusal:
+        parser().parse_args([option, value])
+    assert refusal.value.code == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.startswith(f"patrol_node: error: argument {option}: {value!r} is ")
+    assert line.endswith(f"expected {limits}")
+
+
+@pytest.mark.parametrize("arguments", [["--spee", "2"], ["--twice"], ["stray"]])
+def test_an_unknown_option_is_refused_by_name(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    with pytest.raises(SystemExit) as refusal:
+        parser().parse_args(arguments)
+    assert refusal.value.code == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert arguments[0] in line
+
+
+def test_it_ends_with_its_parent_even_when_that_is_killed(domain: int) -> None:
+    parent = [
+        sys.executable,
+        "-c",
+        (
+            "import subprocess, sys; "
+            "patrol = [sys.executable, '-m', 'lupin_patrol', '--end-with-parent']; "
+            "child = subprocess.Popen(patrol); "
+            "print('child', child.pid, flush=True); child.wait()"
+        ),
+    ]
+    with Process(parent, ros_env(domain)) as process:
+        child = Path("/proc", process.wait_for_output("child").split()[1])
+        process.wait_for_output("patrol starts")
+        process.send(signal.SIGKILL)
+        process.wait()
+        wait_for(lambda: not child.exists(), "the end of the patrol")

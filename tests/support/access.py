@@ -10,19 +10,17 @@ import httpx
 from websockets.exceptions import InvalidStatus
 
 from tests.support.domains import own_domain
+from tests.support.people import OWN
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.waiting import PATIENCE_S
 from tests.support.wss import wss
 
 TOKEN = "a-good-token/of.32~characters+==="
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
-OWN = {"X-Lupin-Twin": "1"}
 
 
 @dataclass(frozen=True)
 class Served:
-    """A `lupin-twin serve` and its address."""
-
     process: Process
     url: str
     trust: ssl.SSLContext | bool = False

@@ -93,12 +93,10 @@ class Archive:
         self.do("UPDATE forwarder SET heard_at = now() + INTERVAL '1 hour'")
 
     def select(self, sql: str) -> list[tuple[Any, ...]]:
-        """A query by its owner."""
         with psycopg.connect(self.owner) as connection:
             return connection.execute(sql).fetchall()
 
     def do(self, sql: str) -> None:
-        """A change by its owner."""
         with psycopg.connect(self.owner) as connection:
             connection.execute(sql)
 
@@ -135,13 +133,11 @@ def rows_of(journal: Path) -> dict[str, list[tuple[Any, ...]]]:
 
 
 def run(*args: str, **env: str) -> subprocess.CompletedProcess[str]:
-    """A command of `lupin-twin` that ends by itself."""
     command = [sys.executable, "-m", "lupin_bridge.cli.command", *args]
     return processes.run(command, _env(env))
 
 
 def forward_once(archive: Archive, journal: Path) -> None:
-    """Forward the rows of a journal."""
     done = run(
         "forward", "--site", archive.site, "--archive-url", archive.url(), "--journal",
         str(journal), "--once",
@@ -159,7 +155,6 @@ def forwarder(archive: Archive, journal: Path, **env: str) -> Process:
 
 
 def wait_until_equal(archive: Archive, journal: Path) -> None:
-    """Wait until the archive equals the journal, row for row."""
     wait_for(lambda: archive.rows() == rows_of(journal), "an archive with the journal's rows")
 
 

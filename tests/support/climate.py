@@ -1,12 +1,17 @@
-"""The truth in the simulated greenhouse, and the known part of its floor."""
+"""The truth in the simulated greenhouse, the known part of its floor, and its ordinary days."""
 
 from copy import deepcopy
-from typing import Any
+from dataclasses import replace
+from typing import Any, Final
 
-from greenhouse_sim.simulator import SensorRegistry
+from greenhouse_sim.simulator import GreenhouseSimulator, SensorRegistry
 
 from lupin_patrol.greenhouse import Point
+from lupin_patrol.mission import DAYS, past
 from lupin_patrol.perception import UNKNOWN, Grid, value_of
+from lupin_twin.core.past import PastWrite
+from lupin_twin.core.state import Pin
+from tests.support.journal import past_write
 
 
 class Truth:
@@ -30,3 +35,20 @@ class Truth:
 def known_in(grid: Grid) -> int:
     """How many cells of a map are known."""
     return len(grid.cells) - grid.cells.count(UNKNOWN.to_bytes(1, "little", signed=True))
+
+
+S: Final = 1_000_000_000
+DAY_NS: Final = 86_400 * S
+_DAY_SPEED: Final = 60.0
+
+
+def ordinary_days() -> list[PastWrite]:
+    """Scans and inspections of three days, from 0 ns on, as a journal returns them."""
+    rows = past(GreenhouseSimulator(), 0, _DAY_SPEED, 1.0, 0)
+    reported = (row for row in rows if not isinstance(row, Pin))
+    return [
+        past_write(
+            number, 1, replace(row, stamp_ns=DAYS * DAY_NS + round(row.stamp_ns * _DAY_SPEED))
+        )
+        for number, row in enumerate(reported, start=1)
+    ]

@@ -1,13 +1,12 @@
-"""One ROS domain per test, also when several test runs share the machine."""
+"""One ROS domain per test, also when several test runs share the machine; what dead ones left."""
 
 import fcntl
 import os
 import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-
-from tests.support.shared_memory import SHARED_MEMORY
 
 # 0 is the common default; above 101 the ports of DDS overlap those of outgoing connections.
 DOMAINS = range(1, 102)
@@ -76,3 +75,34 @@ def ros_env(domain: int, **more: str) -> dict[str, str]:
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         **more,
     }
+
+
+SHARED_MEMORY = Path("/dev/shm")
+LOCK = "_el"
+# A process that is just starting has created its files and not yet locked them.
+YOUNG_S = 10.0
+
+
+def remove_what_the_dead_left(folder: Path = SHARED_MEMORY) -> int:
+    """Remove the segments of dead processes; returns how many.
+
+    A participant's segment, half a megabyte, has a file beside it that its process locks.
+    An unlocked one is unused. This does not hold for ports, which several processes share,
+    and which are small.
+    """
+    removed = 0
+    for lock in folder.glob(f"fastrtps_*{LOCK}"):
+        segment = lock.with_name(lock.name.removesuffix(LOCK))
+        if segment.name.startswith("fastrtps_port"):
+            continue
+        with suppress(FileNotFoundError, PermissionError), lock.open("rb") as file:
+            if time.time() - lock.stat().st_mtime < YOUNG_S:
+                continue
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            segment.unlink(missing_ok=True)
+            lock.unlink()
+            removed += 1
+    return removed

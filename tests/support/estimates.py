@@ -51,16 +51,6 @@ def an_estimate(width: int, height: int, sd_known: float = 2.25) -> Estimate:
     return Estimate(grid, 3, 7)
 
 
-def many_tags(tags: int, passes: int, metres: float) -> Readings:
-    """A large greenhouse, warm here and cold there, standardised, in rounds of 45 minutes."""
-    chance = np.random.default_rng(0)
-    xy = chance.uniform(0.0, metres, (tags, 2))
-    time_s = np.sort(chance.uniform(0.0, passes * 2_700.0, tags * passes))
-    tag = np.concatenate([chance.permutation(tags) for _ in range(passes)])
-    value = np.sin(2.0 * np.pi * time_s / DAY_S) + 0.5 * np.sin(xy[tag, 0])
-    return Readings(time_s, tag, value + chance.normal(0.0, 0.15, len(tag)), xy)
-
-
 _HOURS = st.floats(0.0, 24.0).map(lambda hour: round(hour, 1))
 _METRES = st.floats(-5.0, 5.0).map(lambda metres: round(metres, 1))
 _VALUES = st.floats(-50.0, 50.0).map(lambda value: round(value, 1))

@@ -47,15 +47,12 @@ def forward(archive: Archive, journal: Path, rows: list[Write]) -> None:
 
 
 class Page:
-    """The fleet's page at an address."""
-
     def __init__(self, process: Process) -> None:
         self.process = process
         self.url = url_of(process)
         self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S, trust_env=False)
 
     def sites(self) -> dict[str, dict[str, Any]]:
-        """The overview, by site."""
         answer = self.http.get("/api/sites")
         assert answer.status_code == 200, answer.text
         return {site["site"]: site for site in answer.json()["sites"]}
@@ -79,7 +76,6 @@ class Page:
 
 @contextmanager
 def fleet(archive: Archive, *args: str, user: str = "page") -> Iterator[Page]:
-    """A fleet that serves; it ends with the block."""
     with lupin_twin(0, "fleet", "--archive-url", archive.url(user), *args) as process:
         page = Page(process)
         with page.http:
@@ -88,7 +84,6 @@ def fleet(archive: Archive, *args: str, user: str = "page") -> Iterator[Page]:
 
 @contextmanager
 def frames(page: Page) -> Iterator[Iterator[dict[str, Any]]]:
-    """The frames of the overview in a browser."""
     with open_websocket(page.url.replace("http", "ws", 1) + "/ws/sites") as connection:
 
         def each() -> Iterator[dict[str, Any]]:

@@ -48,7 +48,6 @@ class Viewer:
         return message
 
     def status(self) -> str:
-        """The text of the next error."""
         status = self.reported("status")
         assert status["level"] == 2, status
         return str(status["message"])

@@ -25,7 +25,6 @@ CLOCK = Clock(NOW, NOW, is_simulated=False)
 
 
 def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float) -> Scan:
-    """A successful scan."""
     return Scan(
         tag_id,
         at_ns,
@@ -55,7 +54,6 @@ def inspection(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) ->
 
 
 def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> Pin:
-    """A position."""
     return Pin(tag_id, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
 
 
@@ -141,7 +139,6 @@ def select(path: Path, sql: str) -> list[tuple[object, ...]]:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether SQLite finds no error in a file."""
     connection = sqlite3.connect(path)
     try:
         return connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
@@ -153,7 +150,6 @@ def is_whole(path: Path) -> bool:
 def recording(
     path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, world: World = World()
 ) -> Iterator[Journal]:
-    """A running journal whose clock has started."""
     journal = Journal(path, "/test/lupin_twin", limits, world=world)
     try:
         journal.begin(now)

@@ -38,7 +38,6 @@ def answers(name: str) -> list[tuple[list[Any], Any]]:
 
 
 def answer(connection: sqlite3.Connection, query: list[Any]) -> Any:
-    """The journal's answer, as JSON reads it back."""
     kind, *arguments = query
     return json.loads(json.dumps(_ANSWERS[kind](connection, *arguments)))
 

@@ -35,7 +35,6 @@ def serve_and_web(
 
 
 def wait_until_ready(live: Bridge) -> None:
-    """Wait until the bridge has received a twin."""
     wait_for(lambda: live.get("/readyz").status_code == 200, f"a live twin behind {live.url}")
 
 

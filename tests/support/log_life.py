@@ -33,13 +33,11 @@ Entry = tuple[int, int, float]  # stamp, number, value
 def failure(
     tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0
 ) -> Scan | Inspection:
-    """An attempt that failed."""
     reported = (None, status, "no", "robot", 0, "", at_ns + 1000)
     return Inspection(tag, at_ns, None, *reported) if kind else Scan(tag, at_ns, (), *reported)
 
 
 def _seen(row: Write) -> Flower | None:
-    """What an inspection saw."""
     return row.flower if isinstance(row, Inspection) else None
 
 
@@ -127,8 +125,6 @@ class Life:
 
     def _of(self, tag_id: str) -> list[tuple[int, Write]]:
         return [(n, row) for n, row in self.holds() if tag_id in (EVERY_TAG, row.tag_id)]
-
-    # --- the expected rows --------------------------------------------------------------------
 
     def readings(self, tag_id: str, sensor: str) -> list[Entry]:
         return sorted(
@@ -259,7 +255,7 @@ def check(answer: SeriesPast, request: SeriesRequest, entries: list[Entry], *, n
         assert high == float(f"{max(values):.12g}")
 
 
-# --- for hypothesis: rows in any order, some late, some again; clocks go back ---------------------
+# For hypothesis: rows in any order, some late, some again; clocks go back.
 
 _stamps = st.builds(
     lambda minute, ns: BEGUN + minute * MINUTE + ns, st.integers(0, LATEST), st.integers(0, 3)

@@ -93,12 +93,10 @@ class Twin:
         assert self.memory.apply(write, self.wall_ns) is None
 
     def doubts(self) -> bool:
-        """Whether its clock contradicts the log."""
         return self.memory.is_clock_doubted
 
     @property
     def live(self) -> dict[str, TagState]:
-        """The current state."""
         return by_id(self.store.snapshot(self.now_ns, "map"))
 
     def past(self, at_s: float | None = None) -> dict[str, TagState]:

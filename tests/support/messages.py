@@ -57,7 +57,6 @@ def inspection(
     pose_frame_id: str = "",
     stamp_s: float = 0.0,
 ) -> Any:
-    """An observation of a tag's flowers."""
     msg = Observation(kind=Observation.KIND_FLOWER, source="test")
     msg.header.frame_id = frame_id
     set_stamp(msg.header, stamp_s)

@@ -81,11 +81,9 @@ class Subscriber:
         self._client.loop_stop()
 
     def publish(self, topic: str, payload: str, *, retain: bool = False) -> None:
-        """Publish something."""
         self._client.publish(topic, payload, 1, retain).wait_for_publish(60.0)
 
     def of(self, topic: str) -> list[bytes]:
-        """All payloads of a topic so far."""
         return [bytes(message.payload) for message in self.received if message.topic == topic]
 
     def last(self, topic: str) -> Any:

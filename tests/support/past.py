@@ -31,7 +31,6 @@ ResultT = TypeVar("ResultT")
 
 
 async def look_up(query: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
-    """Answer a query in a worker here."""
     log: Any = past
     return await asyncio.wrap_future(workers.submit(lambda _: query(log), 0.0))
 

@@ -12,7 +12,6 @@ from lupin_twin.core.past import PastRefused
 
 
 def tags_at(at_ns: int, log: LogReader) -> int:
-    """The number of tags."""
     return len(log.state(at_ns).tags)
 
 
@@ -30,7 +29,6 @@ def at_work(_: LogReader) -> tuple[int, int]:
 
 
 def sevens(count: int, _: LogReader) -> Answered:
-    """An answer with that many bytes."""
     return Answered("x", Answer(b"7" * count, "text/plain", {}))
 
 

@@ -45,7 +45,6 @@ def add(path: Path, kind: Kind = "account", secret: str = "", **people: Role) ->
 
 
 def remove(path: Path, name: str, kind: Kind = "account") -> None:
-    """Remove an account, or revoke a token."""
     with changing(path) as accounts:
         accounts.remove(name, kind, by="a test", now_s=int(time.time()))
 
@@ -60,7 +59,6 @@ def begin_session(accounts: Accounts, now_s: int = 1_800_000_000) -> str:
 
 
 def sign_in(client: httpx.Client, name: str, password: str = PASSWORD) -> httpx.Response:
-    """As the page does it."""
     return client.post("/api/signin", json={"name": name, "password": password}, headers=OWN)
 
 
@@ -88,7 +86,6 @@ def signed_in_once(live: Bridge) -> httpx.Client:
 
 
 def write(browser: httpx.Client, **note: Any) -> httpx.Response:
-    """A note."""
     return browser.post("/api/notes", json=note)
 
 

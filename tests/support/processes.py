@@ -127,7 +127,6 @@ class Process:
         wait_for(self._stands_still, "all threads to stand still")
 
     def thaw(self) -> None:
-        """Let a frozen process go on."""
         self.send(signal.SIGCONT)
 
     def holds_signals_back(self) -> bool:
@@ -143,7 +142,6 @@ class Process:
         return all(stat.rpartition(") ")[2].startswith("T") for stat in stats)
 
     def wait(self, timeout_s: float = PATIENCE_S) -> int:
-        """Wait for its end and return the exit code."""
         return self._process.wait(timeout_s)
 
     def stop(self, number: signal.Signals = signal.SIGINT, timeout_s: float = PATIENCE_S) -> int:
@@ -220,7 +218,6 @@ def faults(kind: Literal["--raise", "--hang"], *places: str) -> tuple[str, ...]:
 
 
 def free_port() -> int:
-    """A free port of loopback."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])

@@ -17,8 +17,6 @@ Answer = Callable[["Posted"], Iterator[bytes | None]]
 
 @dataclass(frozen=True)
 class Posted:
-    """One request as it came."""
-
     path: str
     headers: Mapping[str, str]
     body: bytes
@@ -29,13 +27,11 @@ class Posted:
 
 
 def status(code: int, *headers: str) -> Answer:
-    """This status, no body."""
     lines = "".join(f"{line}\r\n" for line in (*headers, "Content-Length: 0"))
     return lambda _: iter([f"HTTP/1.1 {code} Said\r\n{lines}\r\n".encode()])
 
 
 def silence(_: Posted) -> Iterator[bytes | None]:
-    """No answer at all."""
     yield None
 
 

@@ -27,7 +27,6 @@ def latched(depth: int) -> QoSProfile:
 
 
 def clock_at(seconds: float) -> Clock:
-    """A message for `/clock`."""
     clock = Clock()
     clock.clock.sec = int(seconds)
     clock.clock.nanosec = int((seconds % 1) * 1e9)
@@ -70,8 +69,6 @@ class Peer:
         self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
-    # --- publishing -------------------------------------------------------------------------
-
     def publish(self, topic: str, message: Any, depth: int = 50) -> Any:
         """Publish latched, without waiting for subscribers; returns the publisher."""
         publisher = self.publisher(topic, type(message), depth)
@@ -87,16 +84,13 @@ class Peer:
         return self._publishers[topic]
 
     def observe(self, *messages: Any) -> None:
-        """Publish observations."""
         for message in messages:
             self.publish("/floranova/observations", message)
 
     def discover(self, message: Any) -> None:
-        """Publish discovered tags."""
         self.publish("/perception/discovered_tags", message)
 
     def publish_map(self, message: Any) -> None:
-        """Publish an occupancy grid."""
         self.publish("/map", message, depth=1)
 
     def set_clock(self, seconds: float) -> None:
@@ -110,8 +104,6 @@ class Peer:
         if not self.states:
             self.listen()
         self.until(tick, f"a state at {seconds} s")
-
-    # --- listening --------------------------------------------------------------------------
 
     def listen(self, durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> None:
         """Subscribe to `/twin/state`; states are appended to `states`."""
@@ -149,11 +141,9 @@ class Peer:
         return next(tag for tag in state.tags if tag.tag_id == tag_id)
 
     def get_field(self, **request: Any) -> Any:
-        """Call `/twin/get_field` and return the response."""
         return self.call(GetField, "/twin/get_field", **request)
 
     def call(self, kind: Any, service: str, **request: Any) -> Any:
-        """Call a service and return the response."""
         [answer] = self.call_all(kind, service, [kind.Request(**request)])
         return answer
 

@@ -81,7 +81,6 @@ class Alarms(AlarmBoard):
         *,
         is_past: bool = False,
     ) -> None:
-        """Replace the alarms by these."""
         before, found = self.now, board_of(alarms)
         change = change_between(before, found)
         found = before if found.alarms == before.alarms else found

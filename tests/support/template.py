@@ -111,7 +111,6 @@ class Template:
         return self._process.pid
 
     def end(self) -> None:
-        """Kill it, and all that it has started."""
         self._link.close()
         self._process.wait()
         self._output.close()
@@ -145,7 +144,6 @@ class Forked:
         return self._poll(0.0)
 
     def wait(self, timeout_s: float | None = None) -> int:
-        """Wait for its end; returns the exit code."""
         code = self._poll(timeout_s)
         if code is None:
             raise subprocess.TimeoutExpired(self.args, timeout_s or 0.0)

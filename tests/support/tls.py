@@ -18,7 +18,6 @@ class Certificate:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """The options of `lupin-twin`."""
         return ("--tls-cert", str(self.cert), "--tls-key", str(self.key))
 
 

@@ -15,7 +15,6 @@ _OPERATIONS = {"open", "os.link", "os.remove", "os.rename", "os.chmod", "sqlite3
 
 
 def main(path: Path, kill_at: int) -> None:
-    """Upgrade it."""
     seen = 0
 
     def step() -> None:

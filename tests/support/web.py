@@ -46,7 +46,6 @@ class Listener:
         self.connection = connection
 
     def next(self, timeout_s: float = PATIENCE_S) -> Frame:
-        """The next frame, whatever its type."""
         message = self.connection.recv(timeout=timeout_s)
         frame: Frame = json.loads(message)
         return frame
@@ -155,9 +154,6 @@ def bridge(
         httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http,
     ):
         yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
-
-
-# --- clients that do not read -------------------------------------------------------------------
 
 
 @contextmanager

@@ -24,11 +24,9 @@ class Socket:
         self._connection = connection
 
     def recv(self) -> str | bytes:
-        """The next message."""
         return self._runner.run(asyncio.wait_for(self._connection.recv(), PATIENCE_S))
 
     def next_state(self) -> dict[str, Any]:
-        """The next frame with a state."""
         while (frame := json.loads(self.recv()))["type"] != "state":
             pass
         state: dict[str, Any] = frame

@@ -109,7 +109,6 @@ class AlarmFeed:
         self._written = 0
         self._due_ns = FOREVER_NS
         self._is_caught_up = False
-        self._generation = 0
         self.missed = 0
         self._alarm_source: AlarmSource = "journal"
         self._seen: Snapshot | None = None
@@ -191,7 +190,6 @@ class AlarmFeed:
 
     def _begin(self, says: AlarmSource) -> None:
         """Forget all that was read, to read it again."""
-        self._generation += 1
         self._alarm_source = says
         self._log = AlarmLog(self.judge.criteria, self._days)
         self._received, self._seen = [], None

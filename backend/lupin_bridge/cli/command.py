@@ -150,13 +150,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return_large_blocks()
     own, ros_args = split_ros_args(sys.argv[1:] if argv is None else argv)
     for flag, rule in pairwise(ros_args):
-        if flag in {"-p", "--param", "-r", "--remap"} and ":=" not in rule:
+        if flag in _RULES and ":=" not in rule:
             _fail(f"{flag} is {rule!r}, expected NAME:=VALUE")
     options, unknown = parser().parse_known_args(own)
     if unknown:
         name = unknown[0].partition("=")[0]
         known = [option(spec.name) for spec in table()] if options.role in ROLES else []
-        remedy = ": put it after --ros-args" if name in _OF_ROS else meant(name, known)
+        is_of_ros = name in {*_RULES, "--params-file"}
+        remedy = ": put it after --ros-args" if is_of_ros else meant(name, known)
         _fail(f"{name} is not an option of {options.role}{remedy}")
     if options.role == "adapt":
         return adapt.run(options, ros_args)
@@ -208,8 +209,8 @@ ROLES = {
 }
 
 
-# Options of ROS that people give without --ros-args.
-_OF_ROS = ("-p", "--param", "-r", "--remap", "--params-file")
+# Options of ROS with a rule after them; people also give them without --ros-args.
+_RULES = ("-p", "--param", "-r", "--remap")
 
 # Limits of --speed, and of --seed: of the patrol, and of a recording's player.
 PATROL_SPEEDS = (0.1, 50.0)

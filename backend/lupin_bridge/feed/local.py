@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import uuid
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from typing import Any, TypeVar
+from typing import Any
 
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
@@ -17,8 +16,6 @@ from lupin_twin.core.parameters import DAY_S, World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.ros.node import TwinNode
-
-ResultT = TypeVar("ResultT")
 
 # A third of what counts as silence (`frames.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
@@ -80,10 +77,12 @@ class LocalTwin(RosSource[TwinNode]):
 
     async def write_note(self, note: Note) -> Note:
         """See `TwinSource`: the thread of the node's journal writes it."""
-        return await self._in_time(self._result(lambda node: node.memory.journal.write_note(note)))
 
-    async def _result(self, begin: Callable[[TwinNode], Future[ResultT]]) -> ResultT:
-        return await asyncio.wrap_future(await self.thread.call(begin))
+        async def written() -> Note:
+            write = self.thread.call(lambda node: node.memory.journal.write_note(note))
+            return await asyncio.wrap_future(await write)
+
+        return await self._in_time(written())
 
     async def now(self) -> Now:
         """See `TwinSource`."""

@@ -38,7 +38,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import latest
 from lupin_twin.journal.writes import Export, lots, notes, observed, recent, scans, writes
-from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.journal_queries import Recall, Search
 from lupin_twin.runtime.workers import ShouldStop
 
 if TYPE_CHECKING:
@@ -138,8 +138,6 @@ HEAD: Final = struct.Struct(">QQ")
 # nice(2): beside a busy twin it gets a quarter of the core that they share.
 NICENESS: Final = 5
 
-Search = Callable[[Any, ShouldStop], Any]
-
 
 class Child:
     """Answers queries until its input ends; `recall` runs them on the log.
@@ -182,7 +180,7 @@ class Child:
         self._running[number] = running
         running.add_done_callback(partial(self._reply, number))
 
-    def _search(self, query: PastQuery[Any], now: Now) -> Search:
+    def _search(self, query: PastQuery[Any], now: Now) -> Search[Any]:
         return lambda connection, should_stop: query(LogReader(connection, now, should_stop))
 
     # --- in a worker's thread -------------------------------------------------------------------

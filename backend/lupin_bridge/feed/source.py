@@ -258,6 +258,11 @@ class TwinSource(ABC):
         """What the twin observes, as far as it or its log reports that; a demo's day is shorter."""
         return World("unknown")
 
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why nothing is received, where that is not the twin's own problem."""
+        return ()
+
     def revision(self) -> str:
         """The current revision: opaque, changes exactly when a field could; empty: no state yet.
 

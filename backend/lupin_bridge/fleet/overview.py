@@ -139,9 +139,6 @@ def now_json(
 
 # A forwarder sends a heartbeat every two seconds; this long after the last it counts as gone.
 LIVE_S: Final = 10.0
-# How far a site's clock may be ahead of the archive's, ns; readings are valid for longer than that.
-# Beyond it, old readings would pass for new ones: no status is known.
-MAX_AHEAD_NS: Final = 600 * 10**9
 
 
 @dataclass(frozen=True, slots=True)

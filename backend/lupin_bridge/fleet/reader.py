@@ -8,7 +8,6 @@ stands in for a connection to a twin's own journal.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, LogReader, Now, PastQuery, Search
+from lupin_bridge.feed.query import Child, LogReader, Now, PastQuery
 from lupin_bridge.feed.query import main as serve
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
@@ -36,7 +35,7 @@ from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
 from lupin_twin.journal.writes import put_note
-from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.journal_queries import Recall, Search
 from lupin_twin.runtime.workers import ShouldStop
 
 AnswerT = TypeVar("AnswerT")
@@ -76,7 +75,7 @@ class ArchiveChild(Child):
     def __init__(self) -> None:
         super().__init__(ArchiveRecall)
 
-    def _search(self, query: PastQuery[Any] | Note, now: Now) -> Search:
+    def _search(self, query: PastQuery[Any] | Note, now: Now) -> Search[Any]:
         site = now.condition.path
         if isinstance(query, Note):
             return lambda _, stop: _write_note(site, query, stop)
@@ -148,9 +147,7 @@ def _newer_map(log: SiteLog, known: int) -> tuple[int, OccupancyMap | None]:
 class ArchiveRecall(Recall):
     """Queries the archive, each query in a transaction, over pooled connections."""
 
-    def _answer(
-        self, query: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
-    ) -> AnswerT:
+    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
         try:
             connection = self._connection()
             try:

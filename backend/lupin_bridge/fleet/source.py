@@ -20,9 +20,9 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, Periodic, end
-from lupin_bridge.fleet.overview import MAX_AHEAD_NS, Archive, Site
+from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.reader import Reported, latest
-from lupin_bridge.fleet.watcher import News
+from lupin_bridge.fleet.watcher import MAX_AHEAD_NS, News
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
@@ -166,7 +166,7 @@ class SiteTwin(TwinSource):
         # Why new rows could not be read.
         self._problem = ""
         # As last notified: whether it was live, up to where it was read, what was wrong.
-        self._said: tuple[bool, int, str] | None = None
+        self._said: tuple[bool, int, tuple[str, ...]] | None = None
         self._has_read = asyncio.Event()
         self._guard = Guard(f"site {site} is unchanged", *_KNOWN)
         self._reader = Periodic(self._read, HEARTBEAT_S, f"read {site}", 0.0)
@@ -198,6 +198,13 @@ class SiteTwin(TwinSource):
         return World("unknown") if self._reported is None else self._reported.world
 
     @property
+    def problems(self) -> tuple[str, ...]:
+        """See `TwinSource`."""
+        archive = self._watching.archive
+        problem = self._problem if archive.is_reachable else _sentence(archive.message)
+        return (problem,) if problem else ()
+
+    @property
     def _site(self) -> Site:
         return self._watching.sites.get(self.site, Site(self.site))
 
@@ -226,15 +233,14 @@ class SiteTwin(TwinSource):
     async def _notify(self) -> None:
         site, is_live = self._site, self._is_live
         reported = self._reported
-        archive = self._watching.archive
-        problem = self._problem if archive.is_reachable else _sentence(archive.message)
-        said = is_live, self._seq, problem
+        problems = self.problems
+        said = is_live, self._seq, problems
         if reported is None or not (is_live or said != self._said):
             return
         self._said = said
         is_ahead = _newest_ns(reported) - self._watching.now_ns > MAX_AHEAD_NS
         if is_ahead and reported.is_wall_clock:
-            problem = problem or _AHEAD
+            problems = problems or (_AHEAD,)
         stamp_ns = self._now_ns(reported)
         # By the same clock as `now`, if that is the wall's: a later moment would be refused.
         now_ns = stamp_ns if reported.is_wall_clock else self._watching.now_ns
@@ -253,7 +259,7 @@ class SiteTwin(TwinSource):
             journal=self.journal(),
             rules=self.rules,
             origin=reported.world.origin,
-            input_problems=(problem,) if problem else (),
+            input_problems=problems,
             silent_s=0.0 if is_live else ago_s,
         )
         self._on_state(self.update)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
@@ -21,17 +21,9 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, LogReader, Now, Search
+from lupin_bridge.feed.query import Child, LogReader, Now
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.overview import (
-    LIVE_S,
-    MAX_AHEAD_NS,
-    Site,
-    causes,
-    dots,
-    now_json,
-    worst_first,
-)
+from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
 from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
@@ -52,7 +44,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.journal.writes import notes, writes
-from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.journal_queries import Recall, Search
 from lupin_twin.runtime.workers import ShouldStop
 
 log = logging.getLogger(__name__)
@@ -67,6 +59,9 @@ _GATHER_S: Final = 0.05
 _JUDGING_S: Final = 1.0
 # Interval of judging a site again without new rows, because its readings grow old.
 _AGE_S: Final = 10.0
+# How far a site's clock may be ahead of the archive's, ns; readings are valid for longer than that.
+# Beyond it, old readings would pass for new ones: no status is known.
+MAX_AHEAD_NS: Final = 600 * 10**9
 _LOT: Final = 2_000
 # The worst alarms of a site that are shown, shelved ones last; its own page has all of them.
 MAX_ALARMS: Final = 20
@@ -296,11 +291,10 @@ class Watcher:
                 alarms=tuple(entry for _, entry in active[:MAX_ALARMS]),
             )
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
+        is_ahead = newest_ns - now_ns > MAX_AHEAD_NS
         self.sites[name] = replace(
             site,
-            verdict=Verdict.UNKNOWN
-            if newest_ns - now_ns > MAX_AHEAD_NS
-            else judgement.house.verdict,
+            verdict=Verdict.UNKNOWN if is_ahead else judgement.house.verdict,
             dots=dots(judged.snapshot.tags, judgement.tags),
         )
 
@@ -389,7 +383,7 @@ class WatchChild(Child):
         super().__init__(_WithoutJournal)
         self._watcher: Watcher | None = None
 
-    def _search(self, query: Any, now: Now) -> Search:  # noqa: ARG002  # it is of now
+    def _search(self, query: Any, now: Now) -> Search[Any]:  # noqa: ARG002  # it is of now
         return lambda *_: self._look(query)
 
     def _look(self, settings: Settings) -> News:
@@ -407,9 +401,7 @@ class WatchChild(Child):
 
 
 class _WithoutJournal(Recall):
-    def _answer(
-        self, query: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
-    ) -> AnswerT:
+    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
         return query(None, is_abandoned)
 
 

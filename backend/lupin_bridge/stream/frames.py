@@ -173,10 +173,12 @@ def _journal(journal: Condition) -> dict[str, Any]:
 class Liveness:
     """The twin's newest update, when that came, and whether the thread still runs.
 
-    `world()` is what the twin observes, as far as it is known without an update.
+    `world()` is what the twin observes, and `problems()` why nothing comes, as far as they are
+    known without an update.
     """
 
     world: Callable[[], World] = lambda: World("unknown")
+    problems: Callable[[], tuple[str, ...]] = tuple
     stale_after_s: float = STALE_AFTER_S
     update: TwinUpdate | None = None
     updated_s: float = 0.0
@@ -194,7 +196,9 @@ class Liveness:
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
         age_s, world = self.silent_s(now_s), self.world()
-        update = self.update or replace(NO_UPDATE, origin=world.origin)
+        update = self.update or replace(
+            NO_UPDATE, origin=world.origin, input_problems=self.problems()
+        )
         return Status(self._reason(age_s), age_s, update, self.outward, world.day_length_s)
 
     def _reason(self, age_s: float | None) -> Reason:

@@ -1,5 +1,6 @@
 /** The alarm list: active, shelved and resolved alarms, each sorted. Pure. */
 import type { Alarm, HealthReason } from '../contract/types';
+import { numberText } from '../domain/format';
 import { airOf, isOfRange, severity, sideOf } from '../domain/health';
 import { withParts } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
@@ -9,6 +10,9 @@ import { isShelfHeld, isWorse, faultKey, type LocalAlarms, type Shelf } from './
 
 /** How long a resolved alarm stays listed, seconds. */
 export const LISTED_S = 86_400;
+
+/** Most alarms that the bridge sends: the worst active ones, then those resolved last. */
+const MOST_SENT = 1_000;
 
 /** Above this many, alarms that share a cause are grouped under one heading. */
 export const MOST_LOOSE = 4;
@@ -128,6 +132,13 @@ export const unacknowledged = (items: readonly Item[]): readonly Item[] =>
 /** Items that need attention: active, not acknowledged, not shelved. */
 export const calling = ({ active }: AlarmList): readonly Item[] =>
   unacknowledged(active).filter(({ alarm }) => alarm.cleared_at === null);
+
+/** How many alarms a group has: "1,000+", if the bridge may have more. */
+export function countText(list: AlarmList, group: keyof AlarmList): string {
+  const { active, shelved, resolved } = list;
+  const sent = active.length + shelved.length + (group === 'resolved' ? resolved.length : 0);
+  return numberText(list[group].length, 0) + (sent < MOST_SENT ? '' : '+');
+}
 
 /** The alarm of a tag's reason; "too cold" and "too warm" are different alarms. */
 export const alarmOf = (

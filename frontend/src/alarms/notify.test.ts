@@ -66,8 +66,8 @@ describe('title', () => {
     expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
     reportAlarms();
     expect(document.title).toBe('sim 00:00:50 (past) · Lupin twin');
-    expect(titleOf(0, null)).toBe('Lupin twin');
-    expect(titleOf(2, null, 'Recorded')).toBe('(2) Recorded · Lupin twin');
+    expect(titleOf('0', null)).toBe('Lupin twin');
+    expect(titleOf('2', null, 'Recorded')).toBe('(2) Recorded · Lupin twin');
   });
 
   test('without a connection does not pass for one that has no alarms', () => {

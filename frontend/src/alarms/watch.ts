@@ -12,6 +12,7 @@ import { S } from '../strings';
 import { nextEnd, own, pruned, startOwn } from './own';
 import {
   calling,
+  countText,
   EMPTY_LIST,
   listOf,
   newsOf,
@@ -109,10 +110,10 @@ export function startMeanwhile(): () => void {
 }
 
 /** The page title: number of active alarms, a note on the connection, and the shown moment. */
-export const titleOf = (count: number, moment: number | null, note = ''): string => {
+export const titleOf = (count: string, moment: number | null, note = ''): string => {
   const shown = moment === null ? S.product : S.pastTitle(rosText(moment));
   const title = note === '' ? shown : `${note} · ${shown}`;
-  return count === 0 ? title : `(${count}) ${title}`;
+  return count === '0' ? title : `(${count}) ${title}`;
 };
 
 /** In the background, a disconnected tab would look as if it had no alarms. */
@@ -128,7 +129,7 @@ export function startTitle(): () => void {
   const update = (): void => {
     const state = store.get();
     const { moment } = selectShown(state);
-    const title = titleOf(alarmList.get().active.length, moment, noteOf(state));
+    const title = titleOf(countText(alarmList.get(), 'active'), moment, noteOf(state));
     if (document.title !== title) document.title = title;
   };
   update();

@@ -5,11 +5,11 @@ import { ageText, beyondLimitText, minuteText, readingText } from '../domain/for
 import {
   beyondText,
   isOfRange,
-  nameOf,
   ratedText,
   reasonText,
   sideOf,
   todoText,
+  valuesText,
 } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -106,20 +106,21 @@ export function alarmText(alarm: Alarm, sensors: Catalogue, now: Now | null): st
 }
 
 /** The sensors of a tag's alarms that share a cause, with their values now, if known. */
-export function partsText(
+export const partsText = (
   items: readonly Item[],
   sensors: Catalogue,
   nowOf: (alarm: Alarm) => Now | null,
-): string {
-  const texts = items.map(({ alarm }) => {
-    const sensor = sensors.named(alarm.reason.sensor);
-    const now = nowOf(alarm);
-    if (now?.kind !== 'known') return nameOf(sensor);
-    const reading = now.value === null ? '' : ` ${readingText(sensor, now.value)}`;
-    return ratedText(`${nameOf(sensor)}${reading}`, now.verdict);
-  });
-  return [...new Set(texts)].join(', ');
-}
+): string =>
+  valuesText(
+    sensors,
+    items.map(({ alarm }) => {
+      const now = nowOf(alarm);
+      const { value, verdict } = now?.kind === 'known' ? now : NOT_KNOWN;
+      return { ...alarm.reason, value, verdict };
+    }),
+  );
+
+const NOT_KNOWN = { value: null, verdict: 'unknown' } as const;
 
 /** Says that the value now is unknown, and gives the last known one. */
 export function unknownText(

@@ -35,14 +35,6 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
           chosenSensor.set({ name, inView });
         }}
       />
-      {model && model.lines.length > 0 ? (
-        <>
-          <PlotView key={sensor} model={model} height={HEIGHT} />
-          <MarksKey marks={model.lines.flatMap(({ marks }) => marks)} />
-        </>
-      ) : (
-        <ChartState fetched={fetched} hasLines={false} lacks={null} />
-      )}
       <button
         type="button"
         className="text-button"
@@ -53,6 +45,14 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
         <Icon name="chart" size={16} />
         {S.charts}
       </button>
+      {model && model.lines.length > 0 ? (
+        <>
+          <PlotView key={sensor} model={model} height={HEIGHT} />
+          <MarksKey marks={model.lines.flatMap(({ marks }) => marks)} />
+        </>
+      ) : (
+        <ChartState fetched={fetched} hasLines={false} lacks={null} />
+      )}
     </div>
   );
 }

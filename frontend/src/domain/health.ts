@@ -262,13 +262,24 @@ export function causeText(
   if (!air || reasons.length < 2 || reasons.every(isBack)) {
     return reasonsText(sensors, reasons, age, isMarked);
   }
-  const values = reasons.map(({ sensor: name, value, verdict }) => {
-    const sensor = sensors.named(name);
-    const reading = `${nameOf(sensor)} ${readingText(sensor, value ?? NaN)}`;
-    return isMarked ? reading : ratedText(reading, verdict);
-  });
   const ago = age === null ? '' : ` (${S.agoSuffix(ageText(age))})`;
-  return `${S.alarmWhat(S.airCause[air], values.join(', '))}${ago}`;
+  return `${S.alarmWhat(S.airCause[air], valuesText(sensors, reasons, isMarked))}${ago}`;
+}
+
+/** Sensors with their values, if there are any, in one line. */
+export function valuesText(
+  sensors: Catalogue,
+  reasons: readonly HealthReason[],
+  isMarked = false,
+): string {
+  const texts = reasons.map(({ sensor: name, value, verdict }) => {
+    const sensor = sensors.named(name);
+    const text = [nameOf(sensor), ...(value === null ? [] : [readingText(sensor, value)])].join(
+      ' ',
+    );
+    return isMarked ? text : ratedText(text, verdict);
+  });
+  return [...new Set(texts)].join(', ');
 }
 
 /** The outcome of an attempt, by the status of its observation (lupin_msgs/Observation). */

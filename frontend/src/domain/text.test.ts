@@ -9,6 +9,11 @@ test.each([
   ['safe\u202eexe.txt', 'safe\ufffdexe.txt'],
   ['\u2066left\u2069', '\ufffdleft\ufffd'],
   ['zero\u200bwidth', 'zero\ufffdwidth'],
+  ['joined\u200dtext', 'joined\ufffdtext'],
+  [
+    '\u{1f468}\u{1f3fd}\u200d\u{1f33e} and \u{1f33e}\u200d',
+    '\u{1f468}\u{1f3fd}\u200d\u{1f33e} and \u{1f33e}\ufffd',
+  ],
   ['  12  ', '12'],
   ['   ', '\u2423'],
   ['', '\u2423'],

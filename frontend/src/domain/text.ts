@@ -4,9 +4,10 @@
  */
 
 // C0 and C1 controls, soft hyphen, zero-width characters, line and paragraph separators, marks
-// and overrides of writing direction, invisible operators, byte-order mark, tag characters.
+// and overrides of writing direction, invisible operators, byte-order mark, tag characters. First what
+// is none of these: the joiner within one emoji, such as a farmer.
 const INVISIBLE =
-  /[\p{Cc}\p{Cs}\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\u{e0000}-\u{e007f}]/gu;
+  /(\p{Extended_Pictographic}[\ufe0f\p{Emoji_Modifier}]?\u200d(?=\p{Extended_Pictographic}))|[\p{Cc}\p{Cs}\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\u{e0000}-\u{e007f}]/gu;
 /** More combining marks on one letter would reach into other lines. */
 const STACKED_MARKS = /(\p{M}{3})\p{M}+/gu;
 
@@ -35,7 +36,7 @@ export function shown(text: string, longest = LONGEST): string {
   // Cut first, to avoid cleaning a megabyte for eighty characters.
   const clean = text
     .slice(0, longest * 8)
-    .replace(INVISIBLE, REPLACEMENT)
+    .replace(INVISIBLE, (found, emoji?: string) => (emoji ? found : REPLACEMENT))
     .replace(STACKED_MARKS, '$1')
     .trim();
   if (clean === '') return BLANK;

@@ -60,6 +60,11 @@ test('the grid’s numbers are round metres at their lines', () => {
   const labels = context.named('fillText').map(({ args }) => args);
   const two = labels.find(([text, , y]) => text === '2 m' && y === 8);
   expect(two?.[1]).toBe(50 + 2 * 40 + 4);
+  // Clear of the buttons, which are in a row on a wide map.
+  const wide = new FakeContext();
+  drawGridLabels(penOn(wide, { size: { width: 600, height: 250 } }));
+  const along = wide.named('fillText').filter(({ args }) => args[2] === 8);
+  expect(Math.max(...along.map(({ args }) => args[1] as number))).toBeLessThan(360);
 });
 
 test.each([1, 1.5, 2, 3])('the grid’s numbers keep apart at %d times the text', (textScale) => {

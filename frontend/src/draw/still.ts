@@ -133,10 +133,13 @@ export function drawGridLabels(pen: Pen): void {
   context.font = `500 ${10.5 * textScale}px "Inter Variable", system-ui, sans-serif`;
   context.textBaseline = 'top';
   context.textAlign = 'left';
+  // The buttons in the upper right corner are in a row on a low or wide map (map.css).
+  const isLow = size.height <= 300 || size.width >= 1.5 * size.height;
+  const buttons = isLow ? 240 : 96;
   for (const x of columns) {
     const at = view.x + x * view.scale + 4;
-    // Clear of the buttons in the upper right corner and the other axis in the left one.
-    if (at > 30 * textScale && at < size.width - 96) context.fillText(tick(x), at, EDGE_PX);
+    // Clear of the buttons, and of the other axis in the left corner.
+    if (at > 30 * textScale && at < size.width - buttons) context.fillText(tick(x), at, EDGE_PX);
   }
   context.textBaseline = 'bottom';
   for (const y of rows) {

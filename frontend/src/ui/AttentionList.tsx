@@ -69,7 +69,7 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
   const sensors = useApp(selectCatalogue);
   const wrong = urgent.map((own) => {
     const [reason] = own.reasons;
-    const id = `${own.tagId} ${todoText(reason)}`;
+    const id = `${own.tagId} ${reason.kind} ${reason.sensor}`;
     return { own, alarm: { id, tag_id: own.tagId, reason } };
   });
   return blocksOf(wrong, sensors).flatMap(({ key, cause, items }): Line[] =>

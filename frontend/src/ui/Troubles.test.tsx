@@ -70,7 +70,7 @@ test('a mixture of two twins is told, for nothing of it is to be relied on', () 
 
 test('what the twin does not hear is told with the remedy, to its end', () => {
   const why = `/a_node publishes ${'/long'.repeat(60)} as VOLATILE`;
-  goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
+  goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet.'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
     `Not all data arrives here. ${why}; use TRANSIENT_LOCAL.`,
@@ -100,7 +100,11 @@ const journal = (over: Partial<Journal>): void => {
 
 test.each([
   // Not every failure is a full disk: some ask for a restart of the twin, in their own words.
-  ['failing', 'Recording has failed.', /If the disk is full, free space; if it is read-only, make it writable/],
+  [
+    'failing',
+    'Recording has failed.',
+    /If the disk is full, free space; if it is read-only, make it writable/,
+  ],
   ['slow', 'Recording is behind.', /Data waits in memory/],
   ['upgrading', 'The recording of an older version is being upgraded.', /which may take minutes/],
   [

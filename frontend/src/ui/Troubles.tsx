@@ -118,7 +118,7 @@ const UTC = /[\d-]{10}T[\d:]{8}Z/g;
 /** A text of the twin's as a sentence, its times in the page's own form. */
 function sentence(text: string, most = 240): string {
   const said = shown(text, most).replace(UTC, (time) => rosText(Date.parse(time) / 1000));
-  return said && `${said.charAt(0).toUpperCase()}${said.slice(1)}.`;
+  return said && `${said.charAt(0).toUpperCase()}${said.slice(1).replace(/\.$/, '')}.`;
 }
 
 /** Problems below the header, one per line. */

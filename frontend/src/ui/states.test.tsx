@@ -262,6 +262,8 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
       expectSaid(text.slice(text.indexOf(': ') + 2), reported, { ...words.says, ...words.alarms });
     }
     const calls = state.alarms.length;
-    expect(page.titleOf(calls, null)).toBe(calls === 0 ? 'Lupin twin' : `(${calls}) Lupin twin`);
+    expect(page.titleOf(String(calls), null)).toBe(
+      calls === 0 ? 'Lupin twin' : `(${calls}) Lupin twin`,
+    );
   });
 });

@@ -97,8 +97,6 @@ def test_signed_out_sessions_are_remembered_up_to_a_limit_the_longest_lasting_fi
     ]
 
 
-# --- cookies --------------------------------------------------------------------------------------
-
 NAME = "lupin_session_0011aabb"
 
 
@@ -128,9 +126,6 @@ def test_a_cookie_header_is_read_up_to_its_limit(lines: int) -> None:
     assert cookies_of(NAME, headers) == ["a"] * lines
     with pytest.raises(CookieTooLong, match=f"Cookie has {MAX_COOKIE_BYTES + 1} bytes, the limit"):
         cookies_of(NAME, [*headers, (b"cookie", b";")])
-
-
-# --- the accounts file ----------------------------------------------------------------------------
 
 
 NOW = 1_800_000_000
@@ -317,9 +312,6 @@ def test_only_devices_of_people_who_may_read_the_site_are_notified(path: Path) -
     assert found == [1, 0, 0]
 
 
-# --- `lupin-twin user`, `token` and `audit` -------------------------------------------------------
-
-
 STAMP = r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ"
 
 
@@ -329,7 +321,6 @@ def file(tmp_path: Path) -> Path:
 
 
 def ended(file: Path, words: str) -> CompletedProcess[str]:
-    """The command on this file."""
     return run_here(*words.split(), "--accounts", file)
 
 

@@ -1,6 +1,7 @@
 """The access checks of a live bridge, what holds for every answer, and no secret in the log."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
@@ -9,8 +10,9 @@ from lupin_bridge.access.credentials import MAX_COOKIE_BYTES
 from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
 from lupin_bridge.stream import schema
-from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.messages import occupancy_grid, scan
+from tests.support.people import OWN
 from tests.support.proc_stat import cpu_s
 from tests.support.waiting import wait_for
 from tests.support.web import ROUTES, Bridge, bridge
@@ -55,9 +57,6 @@ def refusal_of(answer: httpx.Response) -> str:
     return schema.ErrorMessage.model_validate_json(answer.content).detail
 
 
-# --- Host ---------------------------------------------------------------------------------------
-
-
 def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
     rebound = {"Host": "evil.example:8000", "Origin": "http://evil.example:8000"}
     requested = [(path, rebound) for path in ("/api/state", "/healthz", "/", "/signin", "/nowhere")]
@@ -67,9 +66,6 @@ def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
         detail = refusal_of(answer)
         assert "'evil.example'" in detail
         assert detail.endswith("--allow-host evil.example")
-
-
-# --- Origin -------------------------------------------------------------------------------------
 
 
 def test_a_foreign_page_gets_no_answer_and_no_permission_to_read_one(open_bridge: Served) -> None:
@@ -139,9 +135,6 @@ def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
         assert refusal_of(refused) == "the path has 65 segments, the limit is 64"
 
 
-# --- the token ----------------------------------------------------------------------------------
-
-
 # Without a token, existing and missing paths look the same.
 NOWHERE = ["/nowhere", "/assets/app.js", "/manifest.webmanifest", "/healthz/", "/SIGNIN"]
 
@@ -189,7 +182,6 @@ def test_a_websocket_needs_the_token(closed: Served, path: str) -> None:
 
 
 def session_of(closed: Served) -> str:
-    """The Cookie header of a new session."""
     return closed.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
 
 
@@ -266,9 +258,6 @@ def test_valid_tokens_and_expired_cookies_do_not_count_as_guesses(closed: Served
         assert client.get("/api/state", headers=BEARER).status_code == 200
 
 
-# --- at the start -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("option", "wrong", "is_no"),
     [
@@ -282,15 +271,18 @@ def test_an_impossible_host_or_origin_is_refused_at_the_start(
     assert f"lupin-twin: {option}: '{wrong}' is not {is_no}" in refused_start(option, wrong)
 
 
-def test_listening_beyond_loopback_is_logged_as_a_warning() -> None:
-    with served("--host", "0.0.0.0") as live:
+def test_accounts_that_are_missing_and_listening_beyond_loopback_are_warnings(
+    tmp_path: Path,
+) -> None:
+    missing = tmp_path / "acounts.sqlite"
+    with served("--host", "0.0.0.0", "--accounts", str(missing)) as live:
         warnings = [line for line in live.process.output.splitlines() if "WARNING" in line]
-        assert "without LUPIN_TOKEN" in warnings[0]
-        assert "without --tls-cert" in warnings[1]
+        assert (
+            f"--accounts: {missing} does not exist; until it does, nobody is asked" in warnings[0]
+        )
+        assert "without LUPIN_TOKEN" in warnings[1]
+        assert "without --tls-cert" in warnings[2]
         assert live.get("/api/state").status_code == 200, "it goes by its addresses"
-
-
-# --- what holds for every answer ------------------------------------------------------------------
 
 
 ELSEWHERE = ["/", "/nowhere", "/ws/state"]

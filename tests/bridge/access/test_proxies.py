@@ -24,9 +24,9 @@ from hypothesis import strategies as st
 from lupin_bridge.access.policy import BehindProxies, Proxies, path_of
 from lupin_bridge.serving.server import Certificates, check_pair
 from lupin_bridge.settings import SettingError, Settings
-from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.people import OWN, add, changing
 from tests.support.people import TOKEN as SCADA
-from tests.support.people import add, changing
 from tests.support.processes import limits
 from tests.support.raw_http import handshake
 from tests.support.tls import Certificate, certificate
@@ -236,9 +236,6 @@ def test_proxy_settings_that_depend_on_each_other_are_checked_together() -> None
     assert "must be a header's name" in wrong
 
 
-# --- TLS ------------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def ours(tmp_path_factory: pytest.TempPathFactory) -> Certificate:
     return certificate(tmp_path_factory.mktemp("tls"))
@@ -359,7 +356,6 @@ def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> N
 
 
 def renew(ours: Certificate, folder: Path) -> Certificate:
-    """Replace the served pair by a new one."""
     folder.mkdir()
     new = certificate(folder)
     new.key.replace(ours.key)

@@ -1,6 +1,6 @@
 """The board of alarms, the notes of people on them, and the feed.
 
-`test_live_notes` covers the feed in `serve` and in `web`.
+`test_live_past_web` covers the feed in `serve` and in `web`.
 """
 
 import random

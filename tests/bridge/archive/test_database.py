@@ -84,7 +84,6 @@ def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) ->
 
 
 def command(action: str, url: str, **env: str) -> CompletedProcess[str]:
-    """`lupin-twin archive` of that archive."""
     return run("archive", action, "--archive-url", url, **env)
 
 
@@ -177,9 +176,6 @@ def test_part_of_a_password_is_never_taken_for_a_host() -> None:
     assert "two@" not in done.stderr
 
 
-# --- TLS ------------------------------------------------------------------------------------------
-
-
 def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
     write(journal, recent_scans())
@@ -207,9 +203,6 @@ def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
         done = forwarded(trusted)
         assert done.returncode == 0, done.stderr
         assert len(archive.rows()["scan"]) == len(recent_scans()) - 5
-
-
-# --- parts by month -------------------------------------------------------------------------------
 
 
 DAY = 86_400 * SECOND

@@ -295,7 +295,6 @@ def test_a_second_forwarder_of_a_site_is_refused_by_name(archive: Archive, journ
 
 
 def words(archive: Archive, path: Path, **more: str) -> list[str]:
-    """Words of a command that forwards once."""
     given = {"site": archive.site, "archive_url": archive.url(), "journal": str(path)} | more
     pairs = [(f"--{name.replace('_', '-')}", value) for name, value in given.items()]
     return ["forward", "--once", *(word for pair in pairs for word in pair)]

@@ -197,9 +197,6 @@ def test_an_empty_or_failed_export_leaves_no_file_and_overwrites_none(tmp_path: 
     assert not is_open(target)
 
 
-# --- the command ---------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     made = tmp_path / "j.sqlite"

@@ -123,9 +123,6 @@ def test_a_start_after_the_end_is_refused(tmp_path: Path) -> None:
             recording.check_start(2.5)
 
 
-# --- `demo --from`, with real processes over DDS --------------------------------------------------
-
-
 DAY_S = 86_400.0
 
 

@@ -25,8 +25,6 @@ from tests.support.access import TOKEN, refused_start, served
 
 @pytest.fixture
 def config(tmp_path: Path) -> Any:
-    """Writes a file of settings and returns its path."""
-
     def write(text: str) -> str:
         file = tmp_path / "bridge.toml"
         file.write_text(text, encoding="utf-8")

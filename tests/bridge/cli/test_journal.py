@@ -47,7 +47,6 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def journal(*words: object) -> CompletedProcess[str]:
-    """What `lupin-twin journal` prints."""
     return run_here("journal", *words)
 
 
@@ -55,9 +54,6 @@ def reported(*words: object) -> dict[str, str]:
     """Lines of `info` by their names."""
     lines = (line.partition("  ") for line in journal("info", *words).stdout.splitlines())
     return {what: text.strip() for what, _, text in lines if what}
-
-
-# --- which file ----------------------------------------------------------------------------------
 
 
 def test_the_default_file_is_found_by_the_rule_of_the_node(
@@ -156,9 +152,6 @@ def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -
             assert named in done.stderr
         assert path.read_bytes() == before
     assert {*tmp_path.iterdir()} - {*tmp_path.glob("theirs*")} == {recorded, empty}
-
-
-# --- what it prints ------------------------------------------------------------------------------
 
 
 def test_info_lists_the_content(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -270,9 +263,6 @@ def test_vacuum_prints_the_size_before_and_after(path: Path) -> None:
     assert is_whole(path)
 
 
-# --- where it writes -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("words", "code", "out", "err"),
     [
@@ -306,9 +296,6 @@ def test_a_name_that_is_not_valid_text_is_printed_escaped(path: Path) -> None:
     path.rename(strange)
     done = journal("check", "--journal", strange)
     assert (done.returncode, done.stdout) == (0, f"{strange} is whole\n")
-
-
-# --- backups --------------------------------------------------------------------------------------
 
 
 def test_another_twin_starts_from_a_backup_of_a_running_one(domain: int, tmp_path: Path) -> None:

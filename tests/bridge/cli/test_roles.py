@@ -42,9 +42,6 @@ ALL_TAGS = 29
 NO_JOURNAL = ("--ros-args", "-p", "journal:=off")
 
 
-# --- refused with one line ------------------------------------------------------------------------
-
-
 def refused(process: Process) -> str:
     """The one line with which the command refuses to run."""
     assert process.wait() == 2
@@ -77,9 +74,6 @@ def test_a_bad_argument_is_named(
 ) -> None:
     with lupin_twin(domain, role, *arguments) as process:
         assert named in refused(process)
-
-
-# --- roles --------------------------------------------------------------------------------------
 
 
 def test_the_patrol_ends_when_the_demo_is_killed(domain: int) -> None:
@@ -154,8 +148,6 @@ def unbidden(output: str) -> list[str]:
         and not re.search(r"left behind|fallen silent|estimate of .* not to be trusted", line)
     ]
 
-
-# --- a demo's past --------------------------------------------------------------------------------
 
 ENV = {"XDG_STATE_HOME": "/state"}
 SHORT = ["--speed=50"]
@@ -237,9 +229,6 @@ def test_a_failure_to_fill_in_the_past_is_reported_and_the_demo_goes_on(
     expected = ("argument --speed: ", r"\[Errno 17\] File exists", ".*not a database")
     for text, why in zip(reported, expected, strict=True):
         assert re.match(f"the demo starts without history: {why}", text)
-
-
-# --- what is reported to systemd ------------------------------------------------------------------
 
 
 class Manager:

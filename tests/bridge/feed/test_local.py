@@ -123,9 +123,6 @@ async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain
         await until(lambda: twin.past.pending == {}, "the end of both")
 
 
-# --- work that is shared or repeated --------------------------------------------------------------
-
-
 async def test_a_request_that_arrives_as_the_last_one_is_cancelled_starts_new_work() -> None:
     shared, begun, may_end = Shared[int](), list[None](), asyncio.Event()
 
@@ -178,9 +175,6 @@ async def test_an_error_that_stays_ends_no_repetition_and_is_logged_once(
     await periodic.stop()
     logged = [record.getMessage() for record in caplog.records]
     assert logged == [f"the work had an error and continues: {name}" for name in "abb"]
-
-
-# --- the past process -----------------------------------------------------------------------------
 
 
 pytestmark = pytest.mark.usefixtures("children_know_the_tests")

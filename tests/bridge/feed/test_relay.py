@@ -80,8 +80,6 @@ class Ros:
 
 
 class Ear:
-    """What a listener has received."""
-
     def __init__(self) -> None:
         self.received: list[bytes] = []
 
@@ -216,9 +214,6 @@ async def test_without_the_thread_nothing_is_received_and_nothing_breaks(
         await relay.listen(LIVE, Ear())
 
 
-# --- definitions of message types -----------------------------------------------------------------
-
-
 def package(prefix: Path, name: str, **messages: str) -> None:
     folder = prefix / "share" / name / "msg"
     folder.mkdir(parents=True)
@@ -260,9 +255,6 @@ def test_a_nested_type_that_is_not_installed_is_named_with_the_whole(tmp_path: P
     package(tmp_path, "here_msgs", One="gone_msgs/Two two\n")
     with pytest.raises(LookupError, match="gone_msgs/msg/Two, a part of here_msgs/msg/One, is not"):
         schema_text("here_msgs/msg/One", {"AMENT_PREFIX_PATH": str(tmp_path)})
-
-
-# --- real topics, relayed raw in both roles -------------------------------------------------------
 
 
 @pytest.fixture

@@ -216,9 +216,6 @@ async def test_refusals_are_the_services_and_no_wait_is_endless(
                 await asyncio.to_thread(peer.spin_briefly)
 
 
-# --- copies of journals ---------------------------------------------------------------------------
-
-
 def copies(folder: Path, *ages_s: float) -> list[Path]:
     """One file of each age, each a copy of its own journal."""
     paths = [folder / f"{number:032}.sqlite" for number in range(len(ages_s))]

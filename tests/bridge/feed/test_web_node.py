@@ -42,7 +42,6 @@ class Stage:
         return wait_for(check, what, meanwhile=self._executor.spin_once)
 
     def first_map(self) -> OccupancyMap:
-        """Wait for the first map."""
         found: OccupancyMap = self.until(lambda: self.node.occupancy_map, "a map")
         return found
 
@@ -57,7 +56,6 @@ class Stage:
         return self.reported[-1]
 
     def reported_of(self, stamp_ns: int) -> Snapshot:
-        """The snapshot of that stamp."""
         self.until(lambda: self.reported and self.reported[-1].stamp_ns == stamp_ns, "the state")
         return self.reported[-1]
 
@@ -90,7 +88,6 @@ def has_times(snapshot: Snapshot) -> bool:
 def tag(
     tag_id: str = "1", value: float = 1.0, x: float | None = 1.0, at_s: int = 5, **more: Any
 ) -> TagState:
-    """A tag after one scan."""
     pose = None if x is None else Pose(x, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     readings = (Reading("co2", value, at_s * S),)
     return TagState(tag_id, pose, readings, at_s * S, last_try=Attempt(at_s * S), **more)

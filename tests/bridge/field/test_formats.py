@@ -161,9 +161,6 @@ def test_an_estimate_is_known_where_it_is_certain_to_a_part_of_the_narrowest_ide
         assert formats.within_ideal(ESTIMATE, other) is ESTIMATE
 
 
-# --- the map --------------------------------------------------------------------------------------
-
-
 CELLS = [[0, 100, -1], [-1, 50, 0]]
 NOWHERE_YET = count()
 

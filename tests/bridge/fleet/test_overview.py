@@ -188,6 +188,9 @@ async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_
     await until(lambda: looks > before + 3, "more looks")
     assert watching.archive.message == "the archive cannot be read: 'gh1'"
     assert caplog.text.count("Traceback") == 1
+    # The page of a site that was never read says so too, not only that no twin has reported.
+    late = source.SiteTwin("gh2", watching, watching.process, Workers("none"), 1.0)
+    assert late.problems == ("The archive cannot be read: 'gh1'.",)
     await watching.stop()
 
 

@@ -19,7 +19,7 @@ from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_twin.core.past import PastWrite, PastWrites, RunSpan
 from lupin_twin.core.state import TagState
 from tests.support.alarms_reference import Plain, S, alarms
-from tests.support.ordinary_day import DAY_NS, ordinary_days
+from tests.support.climate import DAY_NS, ordinary_days
 
 SENSORS = own_sensors()
 FOREVER = 2**63 - 1

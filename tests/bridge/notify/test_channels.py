@@ -81,9 +81,6 @@ async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Pat
     assert server.posted[0].json["origin"] == "simulated"
 
 
-# --- the daily report -----------------------------------------------------------------------------
-
-
 SIX = time(6)
 SECRETS = Secrets(webhook_secret="s" * 16)
 

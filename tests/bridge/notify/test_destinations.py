@@ -193,9 +193,6 @@ def test_topics_start_with_the_prefix_and_a_tag_called_house_is_not_the_greenhou
     assert topics.config("sensor", "house", "x") != topics.config("sensor", None, "x")
 
 
-# --- announcements to Home Assistant --------------------------------------------------------------
-
-
 TOPICS = Topics("lupin-twin", "homeassistant")
 
 

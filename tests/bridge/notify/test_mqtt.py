@@ -74,7 +74,6 @@ async def telling(
 
 
 async def until_reported(received: Subscriber, value: float) -> None:
-    """Wait until a broker has received this temperature."""
     await until(
         lambda: (received.last(READING) or {}).get("value") == value, f"the reading {value}"
     )
@@ -248,9 +247,6 @@ async def test_a_password_and_an_authority_satisfy_a_broker_that_needs_them(tmp_
         async with telling(broker, Greenhouse(), secrets=known, mqtt_user=USER) as channel:
             await until(lambda: channel.condition.failed > 0, "the refusal")
             assert "certificate verify failed" in channel.condition.detail
-
-
-# --- changes, once, in their latest form ----------------------------------------------------------
 
 
 def mirror(discovery: str = "homeassistant") -> Mirror:

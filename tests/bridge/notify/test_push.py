@@ -114,9 +114,6 @@ def push_service(folder: Path, *answers: Answer) -> Iterator[tuple[Stage, Certif
         yield Stage(service, accounts), ours
 
 
-# --- Push alone ---------------------------------------------------------------------------------
-
-
 @dataclass
 class Pushing(Stage):
     """Push without a bridge: how it reacts to each answer, with short waits."""
@@ -266,13 +263,8 @@ async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(
     await push.stop()
 
 
-# --- a bridge -----------------------------------------------------------------------------------
-
-
 @dataclass
 class Live(Stage):
-    """A bridge with accounts."""
-
     live: Bridge
 
 
@@ -382,7 +374,6 @@ def test_nothing_is_posted_to_a_name_that_leads_into_a_private_network(
 
 
 def count(client: httpx.Client, what: str) -> int:
-    """A counter of the channel."""
     found = re.search(
         rf'lupin_outward_{what}(?:_total)?\{{channel="push"\}} ([0-9.]+)',
         client.get("/metrics").text,

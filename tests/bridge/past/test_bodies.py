@@ -48,18 +48,12 @@ def history(past: SeriesPast, requested: SeriesRequest = REQUESTED) -> dict[str,
     return found
 
 
-# --- the body -------------------------------------------------------------------------------------
-
-
 def test_each_value_has_its_unit_and_events_have_no_gaps() -> None:
     for sensor_type, unit in (("co2", "ppm"), ("x", ""), ("~silences", "s"), ("~looks", "")):
         assert history(readings(), SeriesRequest("7", sensor_type))["unit"] == unit
     past = readings(1, 2, 3, 90)
     assert history(past, SeriesRequest("7", "~failures"))["gaps"] == []
     assert len(history(past)["gaps"]) == 2
-
-
-# --- gaps -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -107,29 +101,11 @@ def test_gaps_equal_the_simplest_rule(
     assert gaps(past, now_ns) == plain_gaps(known, min(end_ns, now_ns or end_ns))
 
 
-@given(st.lists(st.integers(0, 999)), st.integers(1, 200))
-def test_a_gap_between_buckets_holds_no_reading_and_is_at_least_a_bucket_long(
-    stamps: list[int], width_ns: int
-) -> None:
-    counts: dict[int, int] = {}
-    for stamp in sorted(stamps):
-        counts[stamp // width_ns] = counts.get(stamp // width_ns, 0) + 1
-    found = gaps(buckets(width_ns, counts, end_ns=1_000), None)
-    for since, until in found:
-        assert not [stamp for stamp in stamps if since <= stamp < until]
-        assert until - since >= width_ns or not stamps
-    assert found == sorted(found)
-
-
-# --- events over time -----------------------------------------------------------------------------
-
-
 # The runs, the period, the events, the silences.
 Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 
 
 def one_by_one(stamps_ns: list[int], start_ns: int, end_ns: int) -> SeriesPast:
-    """The events one by one."""
     ones = (1.0,) * len(stamps_ns)
     stamps = tuple(sorted(stamps_ns))
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(stamps), ones, ones, ones)
@@ -256,9 +232,6 @@ def test_single_and_bucketed_events_give_the_same_counts(
     assert timeline_body(runs, period, mixed, silences) == plain
 
 
-# --- how complete an answer is --------------------------------------------------------------------
-
-
 # Two runs; a part of the first one was deleted.
 JOURNAL = Condition(
     JournalState.RECORDING,
@@ -314,9 +287,6 @@ def test_unknown_limits_are_omitted_and_the_reasons_for_missing_data_are_explain
         "; the journal is complete only up to 100.000000000 s"
     )
     assert bodies.why_not(JOURNAL, 70 * NS) == ""
-
-
-# --- rows as CSV ----------------------------------------------------------------------------------
 
 
 ROW = PastRow(1_795_270_500 * NS + 5, "7", 1.5, -2.0, "co2", 412.5, 0, "robot-1")

@@ -243,9 +243,6 @@ def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
         assert len(reported["tries"]) == len(values)
 
 
-# --- derived sensors: only readings of one scan are paired ----------------------------------------
-
-
 S = 10**9
 NOW_NS = 1_000 * S
 Known = dict[str, dict[int, float]]

@@ -139,15 +139,12 @@ def test_the_headers_of_every_format_describe_its_content(live: Bridge, suffix: 
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({"sensor_type": ""}, ["sensor_type is ''", "at least 1 character"]),
         ({"sensor_type": None}, ["sensor_type: field required"]),
         ({"resolution": 0}, ["resolution is '0'", "greater than 0"]),
         ({"resolution": "inf"}, ["resolution is inf", "finite"]),
-        ({"resolution": 1e300}, ["resolution is 1e+300", "float32"]),
         ({"bbox_min_x": 7.0}, ["bbox_min_x", "7.0", "bbox_max_x", "6.0"]),
         ({"bbox_min_y": None}, ["incomplete", "bbox_min_y is missing"]),
         ({"sensor": "co2"}, ["'sensor' is unknown", "expected sensor_type"]),
-        ({"resolution": [0.5, 0.5]}, ["resolution is given more than once"]),
     ],
 )
 def test_a_bad_request_gets_the_failure_body_of_get_field(

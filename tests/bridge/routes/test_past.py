@@ -37,7 +37,6 @@ HISTORY = "/api/history?tag_id=7&sensor_type=co2"
 
 @asynccontextmanager
 async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterator[Running]:
-    """A bridge whose twin has this past."""
     async with running(limits) as it:
         twin = it.twin
         twin.rows = past.rows  # type: ignore[method-assign]
@@ -169,23 +168,6 @@ async def test_an_error_of_the_source_is_reported(
         assert it.bridge.admission.being_computed == it.bridge.admission.exporting == 0
 
 
-async def test_an_invalid_query_is_refused_before_the_source_is_queried(domain: int) -> None:
-    past = MadeUp()
-    async with remembering(past) as it:
-        for path, part in (
-            ("/api/history", "tag_id: field required"),
-            (f"{HISTORY}&points=0", "points is '0'"),
-            (f"{HISTORY}&from=2000-01-01T00:00:00", "from is '2000-01-01T00:00:00', expected"),
-            (f"{HISTORY}&from=2147483647", "later than now"),
-            ("/api/timeline?at=1", "parameter 'at' is unknown"),
-            ("/api/export.csv?to=1&to=1", "to is given more than once"),
-        ):
-            answer = await it.http.get(path)
-            assert answer.status_code == 400
-            assert part in answer.json()["detail"]
-        assert past.requested == []
-
-
 async def test_a_client_that_disconnects_cancels_its_query(domain: int) -> None:
     ended = asyncio.Event()
 
@@ -216,9 +198,6 @@ async def test_queries_declare_their_cost_and_are_timed_by_their_kind(domain: in
         assert 'lupin_past_seconds_count{question="history"} 1.0' in text
         assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text
         assert "lupin_exports_running 0.0" in text
-
-
-# --- as of a moment -------------------------------------------------------------------------------
 
 
 FIELD = "sensor_type=co2&resolution=0.5"
@@ -368,20 +347,29 @@ async def test_simultaneous_equal_queries_run_once(domain: int) -> None:
         assert len(past.requested) <= 1 + it.bridge.state_number - number
 
 
-async def test_the_future_and_invalid_moments_are_refused_before_any_work(domain: int) -> None:
+INVALID = (
+    ("/api/history", "tag_id: field required"),
+    (f"{HISTORY}&points=0", "points is '0'"),
+    (f"{HISTORY}&from=2000-01-01T00:00:00", "from is '2000-01-01T00:00:00', expected"),
+    (f"{HISTORY}&from=2147483647", "later than now"),
+    ("/api/timeline?at=1", "parameter 'at' is unknown"),
+    ("/api/export.csv?to=1&to=1", "to is given more than once"),
+    ("/api/field?sensor_type=co2&resolution=0&at=9", "resolution"),
+)
+INVALID_MOMENTS = (
+    ("2147483647", "at is 2147483647.000000000 s, later than now, "),
+    ("yesterday", "at is 'yesterday', expected ROS seconds"),
+    ("9&at=9", "at is given more than once"),
+    ("9&when=9", "parameter 'when' is unknown"),
+)
+
+
+async def test_an_invalid_query_is_refused_before_any_work(domain: int) -> None:
     past = MadeUp(snapshot=greenhouse())
+    moments = [(f"{path}&at={at}", part) for path in PATHS for at, part in INVALID_MOMENTS]
     async with remembering(past) as it:
-        for path in PATHS:
-            for at, part in (
-                ("2147483647", "at is 2147483647.000000000 s, later than now, "),
-                ("yesterday", "at is 'yesterday', expected ROS seconds"),
-                ("9&at=9", "at is given more than once"),
-                ("9&when=9", "parameter 'when' is unknown"),
-            ):
-                answer = await it.http.get(f"{path}&at={at}")
-                assert answer.status_code == 400
-                name = "error_message" if "field" in path else "detail"
-                assert part in answer.json()[name]
-        answer = await it.http.get("/api/field?sensor_type=co2&resolution=0&at=9")
-        assert "resolution" in answer.json()["error_message"]
+        for path, part in (*INVALID, *moments):
+            answer = await it.http.get(path)
+            assert answer.status_code == 400
+            assert part in answer.json()["error_message" if "field" in path else "detail"]
         assert past.requested == []

@@ -64,9 +64,6 @@ def alarm(live: Bridge, tag_id: str = "a") -> str:
     return f"alarm:{found}"
 
 
-# --- who may ------------------------------------------------------------------------------------
-
-
 def test_with_accounts_every_read_needs_a_name(live: Bridge) -> None:
     for path in ("/api/state", "/api/alarms", "/api/notes", "/metrics", "/api/session"):
         assert live.get(path).status_code == 401
@@ -165,9 +162,6 @@ def test_only_an_admin_reads_the_audit_trail_and_a_reader_cannot_write(live: Bri
         assert (answer.status_code, "vera is a viewer" in answer.text) == (403, True)
         assert vera.delete("/api/notes/1").status_code == 403
         assert not vera.get("/api/session").json()["can_write_notes"]
-
-
-# --- notes --------------------------------------------------------------------------------------
 
 
 def test_a_note_reaches_every_browser_at_once_and_can_be_withdrawn(live: Bridge) -> None:
@@ -272,9 +266,6 @@ def test_a_comment_on_a_tag_or_the_greenhouse_is_found_by_subject_and_period(liv
     assert notes(live, to=str(stamp - 60)) == []
     assert notes(live, **{"from": str(stamp - 60), "subject": "site"})[0].text == "doors open"
     assert live.get("/api/notes", BEARER, tag_id="a").status_code == 400
-
-
-# --- attacks ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

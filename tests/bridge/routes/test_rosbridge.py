@@ -1,7 +1,10 @@
-"""`/rosbridge`: names, and the limits of a client; the rest is in `test_roslib`."""
+"""`/rosbridge`: the real roslib, from npm, connects unchanged; names, and a client's limits."""
 
 import asyncio
-from collections.abc import Callable
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,9 +16,11 @@ from lupin_bridge.routes.sockets import MAX_OPEN_CALLS
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.viewers.rosbridge_session import Reaction, Session
-from tests.support import inprocess
-from tests.support.processes import limits
+from tests.support import inprocess, messages
+from tests.support.domains import own_domain, ros_env
+from tests.support.processes import Process, limits, lupin_twin, url_of
 from tests.support.raw_ws import deaf
+from tests.support.ros import Peer
 from tests.support.rosbridge import (
     FIELD,
     FIELD_ARGS,
@@ -27,7 +32,7 @@ from tests.support.rosbridge import (
     ros_at,
 )
 from tests.support.waiting import until
-from tests.support.web import bridge
+from tests.support.web import Bridge, bridge, listener
 
 
 def test_names_are_those_of_ros() -> None:
@@ -56,9 +61,6 @@ def test_the_limits_of_fields_hold_here_too() -> None:
             "127.0.0.1 requests more than 0.01 computed answers a second, the limit"
         )
         assert greenhouse.get("/api/field", **other).status_code == 429, "of one client, together"
-
-
-# --- in the test's own process, with a twin that can be blocked -----------------------------------
 
 
 def calls(count: int) -> list[Message]:
@@ -281,3 +283,137 @@ async def test_a_client_that_reads_a_reply_slowly_stays(domain: int) -> None:
             assert await reader.read(1 << 20), "it was closed"
         assert len(here.bridge.hub) == 1
         writer.transport.abort()
+
+
+SCRIPT = Path(__file__).parents[2] / "roslib_client.mjs"
+
+
+def roslib(url: str, scenario: str) -> Process:
+    """A process that plays a scenario of `roslib_client.mjs`."""
+    node = shutil.which("node")
+    assert node is not None, "node is not installed"
+    address = url.replace("http", "ws", 1) + "/rosbridge"
+    return Process([node, str(SCRIPT), address, scenario], ros_env(0))
+
+
+def reported_by(process: Process) -> Any:
+    """A scenario's result, printed at its end."""
+    assert process.wait() == 0, process.output
+    return json.loads(process.output.splitlines()[-1])
+
+
+def play(url: str, scenario: str) -> Any:
+    with roslib(url, scenario) as process:
+        return reported_by(process)
+
+
+@pytest.fixture(scope="module")
+def greenhouse() -> Iterator[Bridge]:
+    with bridge() as running:
+        running.peer.observe(messages.scan("1", {"temperature": 20.0}, at=(0.0, 0.0)))
+        running.peer.wait_for_twin()
+        with running.listen() as frames:
+            frames.until_tag("1")
+        yield running
+
+
+def test_a_subscriber_gets_the_state(greenhouse: Bridge) -> None:
+    state = play(greenhouse.url, "latch")["state"]
+    (tag,) = state["tags"]
+    assert (tag["tag_id"], tag["readings"]) == ("1", [{"name": "temperature", "value": 20.0}])
+    assert state["header"]["frame_id"] == "map"
+
+
+def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
+    greenhouse: Bridge,
+) -> None:
+    reported = play(greenhouse.url, "field")
+    assert reported["known"]["callback"] == "done"
+    known = reported["known"]["values"]
+    assert (known["ok"], known["width"], known["height"]) == (True, 12, 12)
+    assert set(known["values"]) == {20.0, None}
+    assert known == greenhouse.json(
+        "/api/field",
+        sensor_type="temperature",
+        resolution=0.5,
+        bbox_min_x=-3,
+        bbox_min_y=-3,
+        bbox_max_x=3,
+        bbox_max_y=3,
+    )
+    assert reported["refused"]["callback"] == "done"
+    assert reported["refused"]["values"]["ok"] is False
+    assert "resolution" in reported["refused"]["values"]["error_message"]
+    assert reported["failed"]["callback"] == "failed"
+    assert reported["failed"]["values"].startswith("args.colour is 'red': extra")
+    assert reported["late"] == {
+        "callback": "failed",
+        "values": "/twin/get_field did not answer within 1e-09 s",
+    }
+
+
+def test_roslibs_queries_about_names_are_answered(greenhouse: Bridge) -> None:
+    reported = play(greenhouse.url, "names")
+    assert dict(zip(*reported["topics"].values(), strict=True)) == {
+        "/twin/state": "lupin_msgs/msg/TwinState",
+        "/floranova/observations": "lupin_msgs/msg/Observation",
+        "/perception/discovered_tags": "lupin_msgs/msg/DiscoveredTags",
+        "/map": "nav_msgs/msg/OccupancyGrid",
+        "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    }
+    assert reported["topicType"] == "lupin_msgs/msg/TwinState"
+    assert "/twin/get_field" in reported["services"]
+    assert reported["serviceType"] == "lupin_msgs/srv/GetField"
+    assert reported["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
+
+
+def test_map_and_inputs_arrive_as_they_were_published(greenhouse: Bridge) -> None:
+    greenhouse.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 50]]))
+    greenhouse.peer.discover(messages.discovered({"1": messages.pose(1.0, 2.0)}))
+    reported = play(greenhouse.url, "inputs")
+    assert (reported["map"]["info"]["width"], reported["map"]["header"]["frame_id"]) == (2, "map")
+    assert reported["map"]["data"] == [0, 100, -1, 50]
+    assert reported["observation"]["tag_reading"]["tag_id"] == "1"
+    assert reported["tags"]["tags"][0]["tag_id"] == "1"
+    # Requested in CBOR, which is not sent: roslib reads them all the same.
+    assert reported["compressed"] == {"cbor": "map", "cbor-raw": "map", "png": "map"}
+    assert reported["statuses"] == []
+
+
+def test_a_client_cannot_write(greenhouse: Bridge) -> None:
+    reported = play(greenhouse.url, "write")
+    assert [status["msg"].partition(":")[0] for status in reported["told"]] == [
+        f"op '{name}' is refused"
+        for name in ("advertise", "publish", "unadvertise", "advertise_service", "auth")
+    ]
+    assert {status["level"] for status in reported["told"]} == {"error"}
+    assert reported["told"][1]["id"].startswith("publish:/cmd_vel:"), "roslib's own id comes back"
+    greenhouse.peer.spin_briefly()
+    assert greenhouse.peer.node.count_publishers("/cmd_vel") == 0
+
+
+def test_two_components_of_a_page_share_a_topic(greenhouse: Bridge) -> None:
+    reported = play(greenhouse.url, "two")
+    assert reported["statuses"] == []
+    assert reported["heardAfterUnsubscribe"] == 0
+    assert reported["afterTheEnd"] == 0
+
+
+def test_a_subscription_survives_a_restart_of_the_bridge() -> None:
+    with own_domain() as domain, lupin_twin(domain, "serve") as first, Peer(domain) as peer:
+        url = url_of(first)
+        peer.wait_for_twin()
+        peer.observe(messages.scan("old", {"temperature": 20.0}))
+        peer.spin_briefly()
+        with listener(url) as frames:
+            frames.until_tag("old")
+        with roslib(url, "reconnect") as client:
+            client.wait_for_output("subscribed")
+            first.kill()
+            port = url.rpartition(":")[2]
+            with lupin_twin(domain, "serve", "--port", port) as second:
+                assert url_of(second) == url
+                reported = reported_by(client)
+    assert [tag["tag_id"] for tag in reported["before"]["tags"]] == ["old"]
+    # The robot's topics are latched, too: the new twin may know the tag again by now.
+    assert [tag["tag_id"] for tag in reported["after"]["tags"]] in ([], ["old"])

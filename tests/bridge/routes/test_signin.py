@@ -13,7 +13,8 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 
 from lupin_bridge.access.credentials import SHARED_SESSION_S, Credentials
-from tests.support.access import BEARER, OWN, TOKEN, Served, served
+from tests.support.access import BEARER, TOKEN, Served, served
+from tests.support.people import OWN
 from tests.support.waiting import PATIENCE_S
 from tests.support.ws_client import last_word
 
@@ -27,9 +28,6 @@ def closed() -> Iterator[Served]:
 def cookie_of(answer: httpx.Response) -> Morsel[str]:
     (cookie,) = SimpleCookie(answer.headers["set-cookie"]).values()
     return cookie
-
-
-# --- the page -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -87,9 +85,6 @@ def test_the_page_has_the_same_texts_in_all_languages() -> None:
         assert [key for key in words if "%" in words[key]] == ["refused"]
 
 
-# --- the exchange -------------------------------------------------------------------------------
-
-
 def test_the_token_is_exchanged_for_a_strict_cookie(closed: Served) -> None:
     answer = closed.post("/api/signin", BEARER)
     assert (answer.status_code, answer.content) == (204, b"")
@@ -118,23 +113,10 @@ def test_there_is_no_cookie_without_the_token_and_a_valid_one_excuses_no_wrong_t
         assert browser.get("/api/state", headers=wrong).status_code == 401
 
 
-def test_without_a_token_there_is_no_sign_in() -> None:
-    with served() as live:
-        page = live.get("/signin")
-        assert (page.status_code, page.headers["location"]) == (303, "./")
-        exchange = live.post("/api/signin", BEARER)
-        assert exchange.status_code == 404
-        assert "needs no token" in exchange.json()["detail"]
-        assert "set-cookie" not in exchange.headers
-
-
-# --- signing out --------------------------------------------------------------------------------
-
 SAME_ORIGIN = {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors", "Sec-Fetch-Dest": "empty"}
 
 
 def session(closed: Served) -> dict[str, str]:
-    """The Cookie header of a new session."""
     cookie = cookie_of(closed.post("/api/signin", BEARER))
     return {"Cookie": f"{cookie.key}={cookie.value}"}
 
@@ -148,7 +130,6 @@ def ending_in(seconds: float) -> dict[str, str]:
 
 @contextmanager
 def listening(closed: Served, headers: dict[str, str], path: str) -> Iterator[ClientConnection]:
-    """A WebSocket of that session."""
     url = closed.url.replace("http", "ws", 1) + path
     with connect(
         url, additional_headers=headers, proxy=None, ping_interval=None, open_timeout=PATIENCE_S
@@ -221,6 +202,9 @@ def test_a_page_knows_whether_it_can_sign_out(closed: Served) -> None:
     assert closed.get("/api/session").status_code == 401
     with served() as live:
         assert live.get("/api/session").json() == program
-        answer = live.post("/api/signout")
-        assert answer.status_code == 404
-        assert "needs no token" in answer.json()["detail"]
+        for path in ("/api/signin", "/api/signout"):
+            answer = live.post(path, BEARER)
+            assert (answer.status_code, "set-cookie" in answer.headers) == (404, False)
+            assert "needs no token" in answer.json()["detail"]
+        page = live.get("/signin")
+        assert (page.status_code, page.headers["location"]) == (303, "./")

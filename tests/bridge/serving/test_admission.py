@@ -37,9 +37,6 @@ HISTORY, EXPORT = "/api/history?tag_id=1&sensor_type=co2", "/api/export.csv?from
 COMPUTED = ("/api/state", HISTORY, EXPORT, "/metrics", "/docs")
 
 
-# --- the rules ----------------------------------------------------------------------------------
-
-
 def admitted(rate_hz: float, seconds: float) -> int:
     """How many evenly spaced requests of a client are admitted, by the default limits."""
     limits = Limits()
@@ -131,8 +128,6 @@ def test_six_clients_at_their_limit_each_get_a_place(is_large: bool) -> None:
     assert admission.being_computed == 0
 
 
-# --- at the routes ------------------------------------------------------------------------------
-
 RATE_HZ = 0.01
 
 
@@ -209,9 +204,6 @@ def test_a_cached_answer_passes_the_limit(slow: Served, route: str) -> None:
         assert [client.get(route).status_code for _ in range(5)] == [200] * 5
 
 
-# --- rates ----------------------------------------------------------------------------------------
-
-
 def taken(limit: RateLimit, client: str, now_s: float, attempts: int) -> int:
     return sum(limit.take(client, now_s) == 0.0 for _ in range(attempts))
 
@@ -257,9 +249,6 @@ def test_the_table_is_bounded_and_drops_the_least_recently_active() -> None:
 )
 def test_an_address_identifies_its_client(address: str, client: str) -> None:
     assert client_key(address) == client
-
-
-# --- the cache ------------------------------------------------------------------------------------
 
 
 def answer(size: int) -> Answer:

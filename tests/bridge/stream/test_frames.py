@@ -39,7 +39,6 @@ def received(wire: bytes) -> bytes:
 
 
 def content(wire: bytes) -> dict[str, Any]:
-    """The content of a frame."""
     decoded: dict[str, Any] = json.loads(received(wire))
     return decoded
 

@@ -75,7 +75,6 @@ class Stage:
         self.hub.announce(now_s)
 
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
-        """Publish active alarms at these tags."""
         board = replace(board_of(alarm(tag_id) for tag_id in tag_ids), source="journal", since_ns=0)
         self.hub.publish_alarms(alarms_message(board, None, (), 0), now_s)
 

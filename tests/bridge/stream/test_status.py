@@ -72,9 +72,10 @@ def test_the_most_specific_reason_comes_first_and_the_log_is_known_before_the_tw
     assert liveness.status(0.0).reason == "thread_dead"
     liveness.shutting_down = True
     assert liveness.status(0.0).reason == "shutting_down"
-    status = Liveness(lambda: World("simulated", 1_440.0)).status(5.0)
+    status = Liveness(lambda: World("simulated", 1_440.0), lambda: ("no archive",)).status(5.0)
     found = (status.reason, status.update.origin, status.day_length_s)
     assert found == ("never_seen", "simulated", 1_440.0)
+    assert status.frame()["input_problems"] == ["no archive"]
 
 
 @pytest.mark.parametrize("reason", get_args(Reason))
@@ -183,9 +184,6 @@ def test_a_change_of_the_journals_state_is_news() -> None:
     assert (stretch.start.sec, stretch.start.nanosec, stretch.end.sec) == (1, 2, 3)
 
 
-# --- alarms, verdicts, accuracy -------------------------------------------------------------------
-
-
 def test_an_answer_without_alarms_or_verdicts_says_so() -> None:
     body = alarms_body([], "starting", None)
     assert body == {"alarms": [], "source": "starting", "since": None}
@@ -236,9 +234,6 @@ def test_the_hit_rate_of_estimates() -> None:
     bare = body["sensors"]["ph"]
     assert (bare["fitted_at"], bare["graded_since"], bare["share_day"]) == (None, None, None)
     assert bare["is_trusted"] is None
-
-
-# --- reports of every sensor ----------------------------------------------------------------------
 
 
 HERE = Pose(1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)

@@ -178,9 +178,6 @@ def test_the_layout_shows_offered_topics_and_each_of_its_panels_has_a_place() ->
     assert placed(layout["layout"]) == set(layout["configById"])
 
 
-# --- one client -----------------------------------------------------------------------------------
-
-
 CHANNELS = {n: Channel(n, Topic("a/msg/B", "", f"/topic{n}"), "int32 x\n") for n in range(1, 201)}
 
 

@@ -64,7 +64,6 @@ def device(broker: Broker) -> Iterator[Client]:
 
 
 def readings(peer: Peer, tag_id: str) -> dict[str, float]:
-    """The latest readings of a tag."""
     tags = {tag.tag_id: tag for tag in peer.states[-1].tags} if peer.states else {}
     tag: Any = tags.get(tag_id)
     return {} if tag is None else {each.name: each.value for each in tag.readings}

@@ -36,9 +36,6 @@ def reason_of(received: Received) -> Reason | None:
     return write.reason if isinstance(write, Drop) else None
 
 
-# --- observations -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
 def test_a_scan_without_a_stamp_has_the_time_of_its_sensors(own_s: int, at_s: int) -> None:
     write = ingest.observation(received_reading(own_stamp_ns=own_s * S), "map", NOW_NS)
@@ -103,9 +100,6 @@ def test_the_time_of_an_observation(stamp_s: float, now_s: float, expected_s: fl
     assert ingest.observed_at(round(stamp_s * S), round(now_s * S)) == round(expected_s * S)
 
 
-# --- poses --------------------------------------------------------------------------------------
-
-
 def test_a_scans_pose_with_w_zero_or_a_broken_number_is_ignored() -> None:
     assert ingest.scanned_pose(replace(at(0.0), qw=0.0)) is None
     assert ingest.scanned_pose(replace(at(0.0), qw=-0.0)) is None
@@ -132,9 +126,6 @@ def test_a_discoverys_half_turn_is_preserved_and_is_not_an_absent_pose(length: f
     assert ingest.scanned_pose(pose_of(pose_message(pose))) == pose
 
 
-# --- discovered tags ----------------------------------------------------------------------------
-
-
 def test_a_discovery_pins_a_tag_without_a_pose_and_changes_no_other() -> None:
     requested = []
 
@@ -157,9 +148,6 @@ def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> Non
     [drop] = ingest.discoveries(received, "odom", "map", is_pinned=lambda _: False)
     assert isinstance(drop, Drop)
     assert drop.on("/t") == "dropped a message on /t: its frame is 'odom', expected 'map'"
-
-
-# --- writing ------------------------------------------------------------------------------------
 
 
 def test_an_accepted_write_is_stored_and_known_and_a_refused_one_is_neither() -> None:

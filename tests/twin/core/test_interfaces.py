@@ -43,7 +43,6 @@ def own(found: list[tuple[str, list[str]]]) -> dict[str, str]:
 
 
 def reported(those: Any) -> dict[str, str]:
-    """The same from the table."""
     return {
         f"/{it.name.lstrip('/')}".replace("<sensor>", sensor): it.type_name
         for it in those

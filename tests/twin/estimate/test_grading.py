@@ -1,25 +1,22 @@
-"""Whether an estimate's intervals hold, over a day and a week."""
+"""How estimates are checked: predictions, changed sensors, trust, and where a tag would help."""
+
+from math import sqrt
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
 from lupin_twin.estimate.engine import TagPast
-from lupin_twin.estimate.grading import (
-    LEAST_SCANS,
-    NOT_GRADED,
-    Record,
-    Tally,
-    predicted,
-    record_of,
-)
+from lupin_twin.estimate.grading import LEAST_SCANS, NOT_GRADED, Record, Tally, predicted, record_of
 from lupin_twin.estimate.kernel import Hyper, Readings, Scale
-from lupin_twin.estimate.model import Model
+from lupin_twin.estimate.model import Model, fit
 from lupin_twin.estimate.posterior import INFLATION
-from lupin_twin.estimate.solution import gap_of
+from lupin_twin.estimate.solution import MAX_EXACT, gap_of
+from lupin_twin.field.grid import FloatArray
 from tests.bench.bench_estimate_checks import AT_S, ROUNDS, trust
 from tests.bench.other_worlds import restless, world_of
 from tests.support import textbook_gp
-from tests.support.estimates import DAY_S, a_day, spots_of
+from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
 
 HOUR_NS = 3_600 * 1_000_000_000
 
@@ -105,3 +102,115 @@ def test_an_estimate_with_poor_coverage_is_distrusted_and_one_with_good_coverage
     is_trusted, covers = trust(windy, windy.read(read.time_s[-1], 0))
     assert is_trusted is False
     assert covers < 0.7
+
+
+def by_the_textbook(readings: Readings, block: list[int], h: Hyper) -> tuple[float, float]:
+    """Mean and sd of a block's last reading, given all other blocks; in the sensor's unit."""
+    y = (readings.value - 20.0) / 2.0
+    mean, covariance = textbook_gp.left_out(spots_of(readings), y, block, h)
+    noise = h.tau**2 + 0.02**2
+    true = float(covariance[-1, -1]) - noise
+    return 20.0 + 2.0 * float(mean[-1]), 2.0 * sqrt(INFLATION**2 * true + noise)
+
+
+@given(some_readings(), hypers)
+def test_the_prediction_is_the_textbooks_without_the_last_four_readings(
+    readings: Readings, h: Hyper
+) -> None:
+    model = Model(Scale(20.0, 2.0), DAY_S, h)
+    found = model.posterior(readings, 2 * DAY_S).changes()
+    order = np.lexsort((np.arange(len(readings)), readings.time_s))
+    for tag, change in enumerate(found):
+        own = [int(row) for row in order if readings.tag[row] == tag]
+        assert (change is None) == (not own)
+        if change is None or change.since_s is not None:
+            continue
+        mean, sd = by_the_textbook(readings, own[-4:], h)
+        assert change.expected == pytest.approx(mean, rel=1e-5, abs=1e-5)
+        assert change.expected_sd == pytest.approx(sd, rel=1e-5)
+
+
+def with_offset(day: Readings, tag: int, scans: int, offset: float) -> tuple[Readings, FloatArray]:
+    """The last scans of a tag are off; and the time of these."""
+    own = np.flatnonzero(day.tag == tag)
+    late = own[np.argsort(day.time_s[own])[-scans:]]
+    value = day.value.copy()
+    value[late] += offset
+    return Readings(day.time_s, day.tag, value, day.xy), np.sort(day.time_s[late])
+
+
+@pytest.mark.parametrize("scans", [2, 4, 9])
+def test_a_sensor_that_reads_three_degrees_more_has_changed_since_then(scans: int) -> None:
+    day = a_day(passes=24)
+    model = fit(day)
+    assert not any(one.since_s is not None for one in model.posterior(day, DAY_S).changes() if one)
+    off, since = with_offset(day, 3, scans, 3.0)
+    found = model.posterior(off, DAY_S).changes()
+    assert [tag for tag, one in enumerate(found) if one and one.since_s is not None] == [3]
+    change = found[3]
+    assert change is not None
+    assert change.since_s == since[0]
+    assert change.offset == pytest.approx(3.0, abs=0.5)
+    assert off.value[off.time_s == since[-1]][0] - change.expected == pytest.approx(3.0, abs=0.5)
+
+
+def test_one_odd_reading_is_no_change_nor_is_a_position_that_was_always_different() -> None:
+    day = a_day(passes=24)
+    model = fit(day)
+    for scans in (1, 24):
+        off, _ = with_offset(day, 3, scans, 3.0)
+        found = model.posterior(off, DAY_S).changes()
+        assert not any(one.since_s is not None for one in found if one)
+
+
+def test_with_many_tags_each_is_judged_by_those_near_it() -> None:
+    day = a_day(tags=200, passes=6)
+    assert len(day) > MAX_EXACT
+    model = fit(day)
+    off, since = with_offset(day, 50, 3, 4.0)
+    found = model.posterior(off, DAY_S).changes()
+    assert [tag for tag, one in enumerate(found) if one and one.since_s is not None] == [50]
+    change = found[50]
+    assert change is not None
+    assert change.since_s == since[0]
+
+
+CANDIDATES = np.array([(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5), (9.0, 9.0)])
+TARGETS = np.array([(0.5, 0.5), (-3.0, 2.0), (8.0, 8.0)])
+
+
+def error_by_the_textbook(readings: Readings, h: Hyper, more: list[int]) -> float:
+    """The root of the mean variance at the targets, with readings now at some candidates."""
+    at_h = float(readings.time_s.max()) / 3600.0
+    spots = spots_of(readings) + [spot_at(CANDIDATES[one], at_h) for one in more]
+    nothing = np.zeros(len(spots))
+    each = [textbook_gp.predicted(spots, nothing, spot_at(place, at_h), h)[1] for place in TARGETS]
+    return sqrt(sum(each) / len(each))
+
+
+@settings(max_examples=40)
+@given(some_readings(), hypers)
+def test_each_position_is_the_best_one_left_and_its_error_is_the_textbooks(
+    readings: Readings, h: Hyper
+) -> None:
+    model = Model(Scale(20.0, 2.0), DAY_S, h)
+    posterior = model.posterior(readings, float(readings.time_s.max()))
+    advice = posterior.advice(CANDIDATES, 3, over=TARGETS)
+    at_first = error_by_the_textbook(readings, h, [])
+    taken: list[int] = []
+    for place in advice:
+        left = [one for one in range(len(CANDIDATES)) if one not in taken]
+        best = min(error_by_the_textbook(readings, h, [*taken, one]) for one in left)
+        chosen = CANDIDATES.tolist().index([place.x, place.y])
+        assert chosen in left
+        taken.append(chosen)
+        error = error_by_the_textbook(readings, h, taken)
+        assert error == pytest.approx(best, rel=1e-6)
+        assert place.error_ratio == pytest.approx(error / at_first, rel=1e-6)
+
+
+def test_no_candidates_give_no_advice() -> None:
+    day = a_day(tags=3, passes=2)
+    posterior = fit(day).posterior(day, DAY_S)
+    assert posterior.advice(TARGETS, 0, over=TARGETS) == []
+    assert posterior.advice(np.empty((0, 2)), 5, over=TARGETS) == []

@@ -1,18 +1,24 @@
-"""GetField without ROS: refusals, the cache, and clipping to explored space."""
+"""GetField without ROS: refusals, the cache, the grid, and clipping to explored space."""
 
 import itertools
 import math
 import tracemalloc
+from fractions import Fraction
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
 from lupin_twin.field import idw
 from lupin_twin.field.engine import (
+    MAX_ENTRIES,
+    FieldCache,
+    FieldKey,
     FieldRefused,
     FieldRequest,
     FieldRules,
@@ -22,8 +28,8 @@ from lupin_twin.field.engine import (
     default_box,
     default_request,
 )
-from lupin_twin.field.grid import FieldGrid
-from lupin_twin.field.idw import Abandoned
+from lupin_twin.field.grid import FieldGrid, grid_dimensions
+from lupin_twin.field.idw import Abandoned, compute_idw_field
 from tests.support.maps import map_of
 
 MAX_CELLS = 1_000_000
@@ -74,9 +80,6 @@ def store() -> TwinStore:
 def answer(store: TwinStore, **rules: float) -> FieldGrid:
     samples = store.samples_for_sensor("temperature")
     return compute_field(request_of(), samples, None, rules_of(**rules))
-
-
-# --- the request -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -130,9 +133,6 @@ def test_a_grid_bomb_is_refused_without_an_allocation(changes: dict[str, Any]) -
     assert peak < 20_000
 
 
-# --- the field ------------------------------------------------------------------------------
-
-
 def test_the_field_uses_the_samples_of_the_store_and_the_rules(store: TwinStore) -> None:
     grid = answer(store)
     assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
@@ -182,9 +182,6 @@ def test_cost_follows_cells_and_the_windows_of_the_samples(
     assert cost == pytest.approx(expected_s, rel=0.01)
 
 
-# --- explored --------------------------------------------------------------------------------
-
-
 def test_a_map_clips_to_known_cells_wherever_the_box_begins(store: TwinStore) -> None:
     request, samples = request_of(bbox_min_x=1.0), store.samples_for_sensor("temperature")
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
@@ -197,9 +194,6 @@ def test_a_map_clips_to_known_cells_wherever_the_box_begins(store: TwinStore) ->
     np.testing.assert_array_equal(clipped, np.where(known, unclipped, np.float32(np.nan)))
 
 
-# --- the default box -------------------------------------------------------------------------
-
-
 def test_the_default_box_covers_the_tags_and_their_reach() -> None:
     positions = ((x, y) for x, y in [(1.0, 5.0), (-2.0, 3.0), (0.0, 8.5)])
     assert default_box(positions, 1.5) == (-3.5, 1.5, 2.5, 10.0)
@@ -210,3 +204,129 @@ def test_cells_of_a_default_request_are_doubled_until_there_are_few_enough() -> 
     assert default_request("co2", box, 12_000_000).resolution == np.float32(0.1)
     assert default_request("co2", box, 11_999_999).resolution == np.float32(0.2)
     assert default_request("co2", (-1e6, -1e6, 1e6, 1e6), 1).resolution >= 2e6
+
+
+RULES = FieldRules(2.0, 1.5, 1.5, 1_000, clip_to_explored=False)
+
+
+def key(number: int) -> FieldKey:
+    """A key that differs from any other by its box."""
+    request = FieldRequest("temperature", 1.0, float(number), 0.0, number + 5.0, 5.0)
+    return FieldKey(request, observation_count=3, map_revision=None, rules=RULES)
+
+
+def grid(cells: int) -> FieldGrid:
+    """A field of one row: 4 bytes a cell."""
+    return compute_idw_field(
+        [],
+        bbox_min_x=0.0,
+        bbox_min_y=0.0,
+        bbox_max_x=float(cells),
+        bbox_max_y=1.0,
+        resolution=1.0,
+        falloff_radius_m=1.0,
+        max_distance_m=1.0,
+        power=2.0,
+    )
+
+
+def test_64_fields_are_cached_and_the_least_recently_used_goes_first() -> None:
+    cache = FieldCache(1e6)
+    for number in range(MAX_ENTRIES):
+        cache.put(key(number), grid(1))
+    assert cache.get(key(0)) is not None
+    cache.put(key(100), grid(1))
+    assert MAX_ENTRIES == 64
+    assert len(cache) == 64
+    assert cache.get(key(0)) is not None
+    assert cache.get(key(1)) is None
+    assert cache.get(key(2)) is not None
+
+
+def test_the_total_bytes_are_limited() -> None:
+    cache = FieldCache(100)
+    for number in range(5):
+        cache.put(key(number), grid(10))
+    assert (cache.bytes, len(cache)) == (80, 2)
+    assert cache.get(key(3)) is not None
+    assert cache.get(key(4)) is not None
+    cache.put(key(5), grid(25))
+    assert (cache.bytes, len(cache)) == (100, 1)
+
+
+def test_a_field_larger_than_the_cache_is_not_cached_and_evicts_nothing() -> None:
+    cache = FieldCache(100)
+    cache.put(key(1), grid(10))
+    cache.put(key(2), grid(26))
+    assert cache.get(key(2)) is None
+    assert cache.get(key(1)) is not None
+    assert cache.bytes == 40
+
+
+def float32(number: float) -> float:
+    return float(np.float32(number))
+
+
+@pytest.mark.parametrize("through", [float, float32, np.float32])
+@pytest.mark.parametrize(
+    ("extent", "resolution", "cells"),
+    [
+        (1000.0, 0.1, 10_000),
+        (0.05, 0.1, 1),
+        (0.0, 0.1, 1),
+        (0.003, 0.001, 3),
+        (70.0, 10.0, 7),
+        (0.027, 0.009, 3),
+        (70.1, 10.0, 8),
+    ],
+)
+def test_dimensions_are_the_extent_in_cells_rounded_up(
+    through: Any, extent: float, resolution: float, cells: int
+) -> None:
+    dimensions = grid_dimensions(
+        through(0.0), through(-extent), through(extent), through(0.0), through(resolution)
+    )
+    assert dimensions == (cells, cells)
+    assert [type(number) for number in dimensions] == [int, int]
+
+
+@settings(max_examples=500)
+@given(
+    st.integers(-100_000, 100_000),
+    st.integers(1, 3000),
+    st.sampled_from(["0.05", "0.1", "0.2", "0.3", "0.7", "1", "2.3"]),
+    st.sampled_from([float, float32]),
+)
+@example(10_001, 11, "0.1", float32)
+def test_float_noise_never_adds_a_cell(
+    tenths: int, cells: int, resolution: str, through: Any
+) -> None:
+    """A whole number of cells, in decimal, stays one: up to 10 km from the origin, rounded too."""
+    low = Fraction(tenths, 10)
+    high = low + cells * Fraction(resolution)
+    bounds = [through(float(low)), through(float(high))]
+    assert grid_dimensions(bounds[0], 0.0, bounds[1], 1.0, through(float(resolution)))[0] == cells
+
+
+@settings(max_examples=300)
+@given(
+    st.integers(-1000, 1000),
+    st.integers(0, 300),
+    st.floats(0.05, 0.95),
+    st.sampled_from([float, float32]),
+)
+def test_part_of_a_cell_is_a_cell(tenths: int, cells: int, part: float, through: Any) -> None:
+    low = tenths / 10
+    high = low + (cells + part) * 0.1
+    width, _ = grid_dimensions(through(low), 0.0, through(high), 1.0, through(0.1))
+    assert width == cells + 1
+
+
+@pytest.mark.parametrize(
+    ("extent", "resolution"), [(1000.0, 1e-9), (3.4e38, 1e-45), (1e308, 5e-324), (1.7e308, 1e-3)]
+)
+def test_grid_bombs_have_exact_dimensions(extent: float, resolution: float) -> None:
+    dimensions = grid_dimensions(0.0, -extent, extent, extent, resolution)
+    assert [type(number) for number in dimensions] == [int, int]
+    cells = Fraction(extent) / Fraction(resolution)
+    assert [float(number / cells) for number in dimensions] == pytest.approx([1.0, 2.0], rel=1e-9)

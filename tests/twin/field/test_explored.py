@@ -1,6 +1,10 @@
-"""Which cells of a field are on explored ground."""
+"""A map's explored cells, its free places, and its row in the journal."""
 
+import base64
+import json
 import math
+import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +14,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_twin.field import explored
-from lupin_twin.field.explored import OccupancyMap, explored_mask
+from lupin_twin.field.explored import (
+    LEAST_APART_M,
+    MARGIN_M,
+    MAX_PACKED_CELLS,
+    MAX_PLACES,
+    OccupancyMap,
+    explored_mask,
+    floor,
+    free_of,
+    text_of,
+)
+from lupin_twin.field.explored import (
+    map_of as read_map,
+)
+from lupin_twin.journal.writer import Journal
+from tests.support import maps
+from tests.support.journal import CLOCK, LIMITS, select
 from tests.support.maps import map_of
+from tests.support.waiting import wait_for
 
 
 def mask_of(
@@ -134,3 +155,110 @@ def test_a_map_that_differs_in_anything_has_another_mask(changes: dict[str, Any]
 def test_a_malformed_map_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         map_of([[0, 0]], **changes)
+
+
+TAGS = np.array([(1.0, 1.0), (3.0, 2.0)])
+
+
+def a_map(rows: list[list[int]], resolution: float = 1.0) -> OccupancyMap:
+    return map_of(rows, resolution=resolution, origin_x=10.0, origin_y=20.0)
+
+
+def test_without_a_map_places_are_around_the_tags() -> None:
+    places = floor(TAGS, None)
+    low, high = TAGS.min(axis=0) - MARGIN_M, TAGS.max(axis=0) + MARGIN_M
+    assert ((places > low) & (places < high)).all()
+    assert len(places) == 8 * 6
+    assert len(floor(TAGS[:1], None)) > 1
+    empty = map_of(np.zeros((0, 0)))
+    np.testing.assert_array_equal(floor(TAGS, empty), places)
+
+
+@pytest.mark.parametrize("far", [5000.0, 1.1e6, 1e300, 1.7e308])
+def test_a_tag_far_off_adds_no_places(far: float) -> None:
+    lost = np.array([(-far, far)])
+    np.testing.assert_array_equal(floor(np.vstack((TAGS, TAGS, lost)), None), floor(TAGS, None))
+    if far > 1e6:
+        assert len(floor(lost, None)) == 0
+
+
+def test_on_a_map_places_are_free_and_known_cells() -> None:
+    places = floor(TAGS, a_map([[0, 100, -1], [49, 50, 10]]))
+    assert sorted(map(tuple, places.tolist())) == [(10.5, 20.5), (10.5, 21.5), (12.5, 21.5)]
+
+
+def test_in_a_large_greenhouse_a_limited_number_of_places_is_spread_out() -> None:
+    places = floor(TAGS, a_map([[0] * 1_000] * 500, resolution=0.05))
+    assert len(places) == MAX_PLACES
+    assert np.ptp(places, axis=0).min() > 20.0
+    np.testing.assert_array_equal(places, floor(TAGS, a_map([[0] * 1_000] * 500, resolution=0.05)))
+
+
+def test_no_place_is_on_a_tag() -> None:
+    places = np.array([(1.0, 1.0 + LEAST_APART_M), (1.0, 0.99 + LEAST_APART_M), (2.0, 0.0)])
+    assert free_of(TAGS, places).tolist() == [[1.0, 1.5], [2.0, 0.0]]
+
+
+FLOOR = maps.map_of([[0, 100, -1], [0, 0, 50]], resolution=0.05, origin_x=-1.5, origin_yaw=0.25)
+OTHER = maps.map_of([[0, 0]])
+TOO_LARGE = maps.map_of(np.zeros((4_001, 4_000), np.int8))
+
+
+def test_a_map_is_read_back_unchanged() -> None:
+    found = read_map(text_of(FLOOR), revision=7)
+    assert found.shows_the_same_as(FLOOR)
+    assert (found.stamp_ns, found.revision) == (FLOOR.stamp_ns, 7)
+
+
+def test_a_floor_of_two_hectares_is_a_tenth_of_a_megabyte() -> None:
+    rows = np.zeros((2_000, 4_000), np.int8)
+    rows[::40] = 100
+    rows[:, ::160] = -1
+    assert 0 < len(text_of(maps.map_of(rows))) < 100_000
+
+
+def test_a_map_that_is_too_large_for_a_row_is_not_stored() -> None:
+    noise = np.random.default_rng(1).integers(0, 100, (1_200, 1_200))
+    assert text_of(maps.map_of(noise)) == ""
+    assert text_of(TOO_LARGE) == ""
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"width": 4},
+        {"width": 10_000_000, "height": 10_000_000},
+        {"width": MAX_PACKED_CELLS, "height": 1},
+        {"width": "3"},
+        {"resolution": 0.0},
+        {"origin_x": None},
+        {"cells": "no base64"},
+        {"cells": base64.b64encode(b"no zlib").decode()},
+        {"cells": base64.b64encode(zlib.compress(bytes(50_000_000))).decode()},
+        {"cells": 5},
+        {"more": 1},
+    ],
+)
+def test_a_text_that_is_no_map_is_refused(changed: dict[str, object]) -> None:
+    text = json.dumps({**json.loads(text_of(FLOOR)), **changed})
+    with pytest.raises(ValueError, match=r"."):
+        read_map(text, revision=1)
+    for other in ("", "[]", "null"):
+        with pytest.raises(ValueError, match=r"."):
+            read_map(other, revision=1)
+
+
+def stored_map(path: Path) -> list[tuple[object, ...]]:
+    return select(path, "SELECT value FROM meta WHERE key = 'map'")
+
+
+def test_the_journal_has_the_latest_map_and_none_where_that_is_too_large(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    for one in (FLOOR, OTHER, TOO_LARGE):
+        journal = Journal(path, "test", LIMITS)
+        try:
+            journal.begin(CLOCK)
+            journal.write_map(one)
+            wait_for(lambda it=one: stored_map(path) == [(text_of(it),)], "the map in the file")  # type: ignore[misc]
+        finally:
+            journal.close()

@@ -1,8 +1,22 @@
+"""Series, events and exports of a log."""
+
+from contextlib import closing
 from pathlib import Path
 from sqlite3 import Connection
 
-from lupin_twin.core.past import EVERY_TAG, SILENCE_NS, Event, SeriesPast, SeriesRequest
+import pytest
+
+from lupin_twin.core.past import (
+    EVERY_TAG,
+    SILENCE_NS,
+    Event,
+    NotRemembered,
+    SeriesPast,
+    SeriesRequest,
+)
 from lupin_twin.journal.queries import series
+from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.writes import LOT, Export, rows
 from tests.support.journal import SECOND, inspection, scan
 from tests.support.log_life import BEGUN, HOUR, LATEST, MINUTE, lived
 
@@ -120,3 +134,76 @@ def test_silences_in_deleted_years_are_still_reported(tmp_path: Path) -> None:
         life.delete(BEGUN + 110 * MINUTE)
         answer = query(life.connection, Event.SILENCES, start=BEGUN, now=BEGUN + 121 * MINUTE)
     assert reported(answer) == [(BEGUN + 29 * MINUTE, 61 * 60.0)]
+
+
+def temperature(start_ns: int = 0, end_ns: int = 0, points: int = 500) -> SeriesRequest:
+    return SeriesRequest("7", "temperature", start_ns, end_ns, points)
+
+
+def test_as_many_readings_as_points_come_singly_and_more_in_buckets(tmp_path: Path) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=BEGUN + n * SECOND, temperature=float(n)) for n in range(10))
+        exact = series(life.connection, temperature(BEGUN, BEGUN + 10 * SECOND, 10), END)
+        assert exact.means == tuple(map(float, range(10)))
+        assert exact.counts == (1,) * 10
+        assert not exact.is_bucketed
+        fewer = series(life.connection, temperature(BEGUN, BEGUN + 10 * SECOND, 9), END)
+        assert fewer.is_bucketed
+        assert fewer.counts == (2, *(1,) * 8)
+
+
+def test_too_many_scans_come_by_the_hour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(300))
+        request = temperature(BEGUN, BEGUN + 300 * MINUTE, 299)
+        monkeypatch.setattr("lupin_twin.journal.counts.MAX_ROWS", 300)
+        assert len(series(life.connection, request, END).stamps_ns) > 200
+        monkeypatch.setattr("lupin_twin.journal.counts.MAX_ROWS", 299)
+        assert series(life.connection, request, END).counts == (60,) * 5
+
+
+def test_batches_come_on_demand_and_nothing_stays_open_between_them(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with lived(path) as life, closing(open_reader(path)) as reader:
+        life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(3 * LOT))
+        lots = rows(reader, 0, END)
+        taken = len(next(lots))
+        assert 0 < taken <= LOT
+        assert not reader.in_transaction
+        life.write([scan("8", BEGUN - SECOND)])
+        # The whole WAL can be checkpointed while an export waits for its reader.
+        checkpoint = life.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+        assert checkpoint == (0, 0, 0)
+        assert sum(map(len, lots)) == 3 * LOT - taken
+
+
+def test_a_deletion_of_rows_still_to_come_ends_the_export(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lupin_twin.journal.writes.STRETCH", 400)
+    total = 3_000
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(total))
+        life.delete(BEGUN + 100 * SECOND)  # long ago
+        whole, late, early = (Export(0, END, None, None) for _ in range(3))
+
+        def taken(export: Export, at_least: int) -> int:
+            reported = 0
+            while reported < at_least:
+                reported += len(export.step(life.connection) or [])
+            return reported
+
+        taken(late, 1)
+        reported = taken(whole, 2_000)
+        life.delete(BEGUN + 1_000 * SECOND)
+        # An export past these rows gets the rest.
+        while (found := whole.step(life.connection)) is not None:
+            reported += len(found)
+        assert reported == total - 100
+        with pytest.raises(NotRemembered, match="deleted while"):
+            taken(late, total)
+        # And one that has not started begins later.
+        left = 0
+        while (found := early.step(life.connection)) is not None:
+            left += len(found)
+        assert left == total - 1_000

@@ -19,8 +19,6 @@ LOST = "lost"
 
 
 class Ended(NamedTuple):
-    """The exit code of a command, and its output."""
-
     returncode: int
     stdout: str
     stderr: str
@@ -41,8 +39,6 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def journal(path: Path, capsys: pytest.CaptureFixture[str]) -> Journal:
-    """The command, with this journal."""
-
     def run(action: str, *words: str) -> Ended:
         capsys.readouterr()
         return Ended(

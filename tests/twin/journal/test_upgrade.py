@@ -56,9 +56,6 @@ def names_in(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-# --- content --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("name", "kept"), [("day", "j.sqlite.v3"), (VERSION4, "j.sqlite.v4")])
 def test_the_old_file_stays_unchanged_beside_the_new_one(
     name: str, kept: str, tmp_path: Path
@@ -153,9 +150,6 @@ def test_version_4_keeps_its_identity_and_every_row(tmp_path: Path) -> None:
                     for sensor, counts in enumerate(zip(*of, strict=True))
                 ]
             assert rows == before != [], table
-
-
-# --- interruptions --------------------------------------------------------------------------------
 
 
 def child(path: Path, number: int) -> subprocess.CompletedProcess[str]:

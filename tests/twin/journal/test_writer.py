@@ -1,25 +1,35 @@
+"""The journal's thread and its file: what is written, lost, replaced, and saved from damage."""
+
 import os
 import shutil
 import sqlite3
 import time
 from contextlib import closing
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from pkgutil import resolve_name
+from random import Random
 
 import pytest
 
 from lupin_twin.core.diagnostics import JournalState
-from lupin_twin.core.state import Write
+from lupin_twin.core.state import Reading, Write
+from lupin_twin.journal.paths import Syncing
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Turn
-from lupin_twin.journal.schema import DamagedFile
+from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.schema import DamagedFile, open_writer
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import (
     CLOCK,
     LIMITS,
     NOW,
     SECOND,
+    append,
+    is_whole,
     known,
+    opened,
     pin,
     recording,
     scan,
@@ -31,16 +41,17 @@ from tests.support.waiting import wait_for
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    return tmp_path / "state" / "j.sqlite"
+    return tmp_path / "j.sqlite"
 
 
-def count(path: Path) -> int:
+def scans_in(path: Path) -> int:
     ((rows,),) = select(path, "SELECT count(*) FROM scan")
     assert isinstance(rows, int)
     return rows
 
 
-def test_a_write_is_stored_and_known_after_a_restart(path: Path) -> None:
+def test_a_write_is_stored_and_known_after_a_restart(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "j.sqlite"
     rows: set[Write] = {pin(), *(scan(str(n)) for n in range(1000))}
     with recording(path) as journal:
         assert journal.take_restored(30.0) is not None
@@ -105,7 +116,6 @@ def test_a_second_twin_is_refused_by_name_and_takes_over_when_the_first_has_ende
 
 
 def test_a_damaged_file_is_quarantined_and_the_twin_goes_on(path: Path) -> None:
-    path.parent.mkdir()
     path.write_text("nothing of the kind" * 1000)
     with recording(path) as journal:
         journal.write(scan())
@@ -246,5 +256,131 @@ def test_age_and_size_limits_are_applied(path: Path, monkeypatch: pytest.MonkeyP
             journal.write(scan(at_ns=old + n))
         journal.write(scan(at_ns=now))
         wait_for(lambda: journal.condition.written == 1001, "all rows")
-        wait_for(lambda: count(path) == 1, "the purge")
+        wait_for(lambda: scans_in(path) == 1, "the purge")
         assert journal.condition.state is JournalState.RECORDING
+
+
+def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
+    too_late = scan(at_ns=2**63)
+    no_number = replace(scan("8"), readings=(Reading("t", "x"),))  # type: ignore[arg-type]
+    assert append(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
+    assert known(path) == {scan("1"), scan("2")}
+
+
+def test_a_reading_with_all_digits_takes_at_most_60_bytes(path: Path) -> None:
+    chance = Random(1)
+    rows = [
+        replace(
+            scan(str(number % 20), NOW + number * 30 * SECOND),
+            readings=tuple(Reading(name, chance.random()) for name in "abcde"),
+        )
+        for number in range(3_000)
+    ]
+    append(path, rows)
+    assert path.stat().st_size / (5 * len(rows)) < 60
+
+
+def test_runs_are_written_to_a_replaced_file(path: Path) -> None:
+    with opened(path) as file:
+        run = file.start(CLOCK, is_believed=False).run
+        end = file.end
+    path.unlink()
+    with opened(path) as file:
+        file.retain_run(run, end)
+        file.retain_run(run, end)
+        assert file.append([(run, scan())]) == (1, 0)
+    assert known(path) == {scan()}
+
+
+def test_maintenance_purges_and_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lupin_twin.journal.file.LOG_BYTES", 10_000)
+    monkeypatch.setattr("lupin_twin.journal.file.PURGE_EVERY_S", 0.0)
+    with opened(path, Limits(days=36_500, max_bytes=60_000)) as file:
+        run = file.start(CLOCK, is_believed=False).run
+        file.append([(run, scan(at_ns=NOW + n)) for n in range(5000)])
+        steps = 0
+        while file.check_size(may_purge=True):
+            steps += 1
+        assert steps > 10
+    ((left,),) = select(path, "SELECT count(*) FROM scan")
+    assert isinstance(left, int)
+    assert 0 < left < 1000
+    assert path.stat().st_size < 400_000
+    assert is_whole(path)
+
+
+def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lupin_twin.journal.file.PURGE_EVERY_S", 0.0)
+    append(path, [scan(at_ns=NOW + n) for n in range(500)])
+    with recording(path, limits=Limits(days=36_500, max_bytes=10_000)) as journal:
+        wait_state(
+            journal, JournalState.RECORDING, "no scans are kept: the hours, which are never deleted"
+        )
+    assert select(path, "SELECT count(*) FROM scan") == [(0,)]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
+    append(path, [scan(at_ns=NOW + n) for n in range(300)])
+    aside = quarantine(path)
+    if not is_there:  # the file was removed
+        aside.unlink()
+    with opened(path):
+        pass
+    assert select(path, "SELECT count(*) FROM scan") == [(300 if is_there else 0,)]
+    assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
+
+
+@pytest.mark.parametrize("renamed", [0, 1, 2])
+def test_a_quarantine_that_was_killed_is_completed(
+    path: Path, monkeypatch: pytest.MonkeyPatch, renamed: int
+) -> None:
+    left = path.with_name("left.sqlite")
+    with opened(path) as file:
+        run = file.start(CLOCK, is_believed=False).run
+        file.append([(run, scan(at_ns=NOW + n)) for n in range(300)])
+        for end in ("", "-wal"):  # as a killed twin leaves them
+            shutil.copy(f"{path}{end}", f"{left}{end}")
+    rename, done = Path.rename, count()
+
+    def killed(old: Path, new: Path) -> None:
+        if next(done) == renamed:
+            raise KeyboardInterrupt
+        rename(old, new)
+
+    with monkeypatch.context() as killing:
+        killing.setattr(Path, "rename", killed)
+        with pytest.raises(KeyboardInterrupt):
+            quarantine(left)
+    with opened(left) as file:
+        assert Path(file.quarantined).name.startswith("left.sqlite.damaged-")
+    assert select(left, "SELECT count(*) FROM scan") == [(300,)]
+    assert not left.with_name("left.sqlite.new").exists()
+
+
+def test_a_failed_sync_is_reported_with_the_next_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(descriptor: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fdatasync", fail)
+    path = tmp_path / "j.sqlite"
+    connection = open_writer(path)
+    connection.execute("INSERT INTO site VALUES ('7', '')")
+    syncing = Syncing(path, period_s=0.0)
+
+    def write() -> str:
+        try:
+            syncing.has_written()
+        except OSError as error:
+            return str(error)
+        return ""
+
+    assert "Input/output error" in wait_for(write, "the error")
+    with pytest.raises(OSError, match="Input/output"):
+        syncing.has_written()
+    syncing.close()
+    connection.close()

@@ -1,20 +1,43 @@
+"""Bytes of messages: which are read, and up to which limits."""
+
 import random
 import struct
+from functools import reduce
 from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Polygon, PoseWithCovarianceStamped
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Point32, Polygon, PoseWithCovarianceStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lupin_msgs.msg import DiscoveredTags, Observation, TagReading, TwinState
+from lupin_msgs.msg import (
+    DiscoveredTag,
+    DiscoveredTags,
+    FlowerPoint,
+    Observation,
+    SensorReading,
+    TagReading,
+    TagTimes,
+    TwinState,
+    TwinTagState,
+    TwinTimes,
+)
 from nav_msgs.msg import OccupancyGrid
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import ByteMultiArray, Float64MultiArray
 
-from lupin_twin.ros.message_limits import MalformedError, MessageShape
+from lupin_twin.core.drops import (
+    MAX_BLOOMS_PER_TAG,
+    MAX_FOOTPRINT_POINTS,
+    MAX_ITEMS,
+    MAX_SENSORS_PER_TAG,
+    MAX_TAGS,
+)
+from lupin_twin.ros import message_limits
+from lupin_twin.ros.message_limits import MalformedError, MessageShape, TooManyError
 from tests.support.hostile import anything, lies
 
 OURS = (Observation, DiscoveredTags, TwinState, OccupancyGrid)
@@ -111,3 +134,54 @@ def test_a_sequence_holds_as_many_as_fit_into_its_bytes_and_not_one_more() -> No
         MalformedError, match="points: 4 of at least 12 bytes are claimed, 36 bytes are left"
     ):
         shape.check(bytes(data))
+
+
+@pytest.mark.parametrize(
+    ("shape", "message_type", "path", "element", "limit"),
+    [
+        (
+            *(message_limits.OBSERVATION, Observation, "tag_reading.readings", SensorReading),
+            MAX_SENSORS_PER_TAG,
+        ),
+        (
+            *(message_limits.OBSERVATION, Observation, "flower.flowers", FlowerPoint),
+            MAX_BLOOMS_PER_TAG,
+        ),
+        (
+            *(message_limits.OBSERVATION, Observation, "flower.box_footprint.points", Point32),
+            MAX_FOOTPRINT_POINTS,
+        ),
+        (message_limits.DISCOVERED_TAGS, DiscoveredTags, "tags", DiscoveredTag, MAX_TAGS),
+        (message_limits.STATE, TwinState, "tags", TwinTagState, MAX_TAGS),
+        (message_limits.TIMES, TwinTimes, "tags", TagTimes, MAX_TAGS),
+        (
+            *(message_limits.DIAGNOSTICS, DiagnosticArray, "status", DiagnosticStatus),
+            message_limits.MAX_STATUSES,
+        ),
+    ],
+)
+def test_as_many_as_can_be_stored_are_accepted_and_not_one_more(
+    shape: MessageShape, message_type: Any, path: str, element: Any, limit: int
+) -> None:
+    def message(count: int) -> bytes:
+        made = message_type()
+        *parts, name = path.split(".")
+        setattr(reduce(getattr, parts, made), name, [element()] * count)
+        return bytes(serialize_message(made))
+
+    assert shape.check(message(limit))
+    with pytest.raises(TooManyError, match=rf"^{path}: {limit + 1}, the limit is {limit}$"):
+        shape.check(message(limit + 1))
+
+
+def test_a_state_holds_as_many_items_as_a_twin_stores_and_not_one_more() -> None:
+    # One tag with all of them: their kind and their tag do not matter.
+    empty = serialize_message(TwinState(tags=[TwinTagState()]))
+    for count, is_taken in ((MAX_ITEMS + MAX_TAGS - 1, True), (MAX_ITEMS + MAX_TAGS, False)):
+        # The last sequence of the message: points of three float32.
+        data = empty[:-4] + count.to_bytes(4, "little") + bytes(12 * count)
+        if is_taken:
+            assert message_limits.STATE.check(data) == len(data)
+        else:
+            with pytest.raises(TooManyError, match=r"^tags.box_footprint.points: more elements"):
+                message_limits.STATE.check(data)

@@ -11,9 +11,11 @@ from geometry_msgs.msg import Quaternion
 from hypothesis import given
 from hypothesis import strategies as st
 from lupin_msgs.msg import Observation as ObservationMsg
+from lupin_msgs.srv import GetEstimateReport
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.core import history, ingest
+from lupin_twin.core.diagnostics import ERROR, OK, Finding
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
     STATUS_OK,
@@ -26,7 +28,14 @@ from lupin_twin.core.state import (
     Snapshot,
     TagState,
 )
-from lupin_twin.ros import convert
+from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.estimate.solution import Place
+from lupin_twin.field.engine import FieldRefused
+from lupin_twin.journal.follow import Lot, NotALotError
+from lupin_twin.ros import convert, convert_services
+from lupin_twin.ros.convert import diagnostics, findings_of
+from lupin_twin.ros.convert_services import lot_of, rows_response
+from lupin_twin.runtime.estimates import DEFAULT_PLACES, Report, ReportRequest, TagCheck
 from tests.support import messages
 
 S = NANOSECONDS_PER_SECOND
@@ -146,3 +155,88 @@ def test_a_maps_yaw_comes_from_its_quaternion_normalised_or_not(yaw: float) -> N
         assert (occupancy.origin_x, occupancy.origin_y, occupancy.revision) == (1.0, 2.0, 3)
         assert occupancy.resolution == 0.05
         assert occupancy.cells.tolist() == [[0, 100]]
+
+
+REPORT = Report(
+    5 * S,
+    True,
+    "why",
+    Record(3 * S, Tally(10, 9), Tally(70, 60)),
+    (
+        TagCheck("a", 20.0, 2 * S, 21.0, 0.5, -2.0, -1.0, None),
+        TagCheck("b", 30.0, S, 21.0, 0.5, 9.0, 9.0, S),
+    ),
+    (Place(1.0, 2.0, 0.75),),
+)
+
+
+def test_a_report_has_its_counts_tags_and_places_in_columns() -> None:
+    response = convert_services.report_response(REPORT)
+    assert (response.ok, response.at.sec, response.fitted_at.sec) == (True, 5, 5)
+    assert (response.fit_problem, response.graded_since.sec) == ("why", 3)
+    assert (response.day_scans, response.day_inside) == (10, 9)
+    assert (response.week_scans, response.week_inside) == (70, 60)
+    assert (response.tag_ids, [*response.measured], [*response.z]) == (
+        ["a", "b"],
+        [20.0, 30.0],
+        [-2.0, 9.0],
+    )
+    assert [at.sec for at in response.changed_since] == [0, 1]
+    assert [*response.left_out] == [False, True]
+    assert [*response.error_ratio] == [0.75]
+    bare = convert_services.report_response(Report(S))
+    assert (bare.fitted_at.sec, bare.graded_since.sec, bare.tag_ids) == (0, 0, [])
+
+
+def test_a_report_query_without_a_number_of_places_gets_five() -> None:
+    message = GetEstimateReport.Request(sensor_type="co2")
+    assert convert_services.report_request_of(message) == ReportRequest("co2", DEFAULT_PLACES)
+    message.max_places = 7
+    assert convert_services.report_request_of(message) == ReportRequest("co2", 7)
+    message.max_places = 21
+    with pytest.raises(FieldRefused, match="max_places is 21, the limits are 1 and 20"):
+        convert_services.report_request_of(message)
+
+
+LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä","5"]'), 9, True)
+
+
+@pytest.mark.parametrize(
+    "lot",
+    [
+        LOT._replace(last=7),
+        LOT._replace(last=8, is_all=False),
+        LOT._replace(journal="../../home"),
+        LOT._replace(journal=""),
+        LOT._replace(rows=("[]",) * 500_001),
+    ],
+)
+def test_a_batch_without_a_next_number_or_a_journal_is_invalid(lot: Lot) -> None:
+    with pytest.raises(NotALotError):
+        lot_of(rows_response(lot), 8)
+
+
+MESSAGE = [
+    Finding("clock", OK, "it runs", {"state": "running"}),
+    Finding("drops", ERROR, "", {}),
+    Finding("twins", OK, "", {"state topic": "/gh1/twin/state"}),
+]
+
+
+def test_findings_become_statuses_of_their_node_and_back() -> None:
+    msg = diagnostics(MESSAGE, "/gh1/lupin_twin", 7 * S)
+    assert msg.header.stamp.sec == 7
+    assert [status.name for status in msg.status] == [
+        "/gh1/lupin_twin: clock",
+        "/gh1/lupin_twin: drops",
+        "/gh1/lupin_twin: twins",
+    ]
+    assert list(findings_of(msg, "/gh1/twin/state")) == MESSAGE
+
+
+def test_a_twin_is_identified_by_the_state_that_it_publishes() -> None:
+    msg = diagnostics(MESSAGE, "/gh1/lupin_twin", 7 * S)
+    others = diagnostics(MESSAGE[:2], "/gh2/lupin_twin", 7 * S).status
+    msg.status = [*others, *msg.status, *others]
+    assert list(findings_of(msg, "/gh1/twin/state")) == MESSAGE
+    assert not list(findings_of(msg, "/gh2/twin/state"))

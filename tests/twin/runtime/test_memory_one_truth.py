@@ -22,26 +22,15 @@ def count(path: Path) -> int:
     return found
 
 
-# --- 1: latest, and what is received again --------------------------------------------------------
-
-
-def test_of_one_write_received_twice_the_first_value_stays(path: Path) -> None:
-    with twin(path) as life:
-        life.receive(-5, t=20.0)
-        life.receive(-5, t=25.0)
-        assert life.reading() == (20.0, 5.0)
-    with twin(path) as life:
-        life.receive(-5, t=25.0)
-        assert life.reading() == (20.0, 5.0)
-        assert count(path) == 1
-
-
 def test_new_sensors_extend_the_same_scan(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=20.0)
         life.receive(-5, t=25.0, h=60.0)
         assert life.reading("t") == (20.0, 5.0)
         assert life.reading("h") == (60.0, 5.0)
+    with twin(path) as life:
+        life.receive(-5, t=25.0)
+        assert life.reading("t") == (20.0, 5.0)
     assert select(path, "SELECT readings, stamp_ns FROM scan ORDER BY seq") == [
         ("[20.0]", NOW - 5 * S),
         ("[60.0]", NOW - 5 * S),
@@ -80,9 +69,6 @@ def test_a_failed_attempt_makes_nothing_younger(path: Path) -> None:
         assert life.live == life.past() == before
 
 
-# --- 2: stamps from the future --------------------------------------------------------------------
-
-
 def test_a_stamp_from_the_future_counts_as_its_first_receipt(path: Path) -> None:
     with twin(path) as life:
         life.receive(60, t=20.0)
@@ -107,9 +93,6 @@ def test_it_stays_known_however_many_attempts_follow(path: Path) -> None:
         life.receive(60, t=20.0)
         assert life.reading("t") == (20.0, 100.0)
         assert count(path) == 12
-
-
-# --- 3: runs and steps ----------------------------------------------------------------------------
 
 
 def runs(path: Path) -> list[tuple[object, ...]]:
@@ -243,8 +226,6 @@ def test_a_simulation_that_is_played_again_writes_everything_anew(path: Path) ->
     assert runs(path) == [(1, None), (2, None)]
 
 
-# --- 4: a clock that contradicts the log ----------------------------------------------------------
-
 BOOT = -3e8  # a board without a clock of its own starts years ago
 
 
@@ -307,9 +288,6 @@ def test_a_clock_that_does_not_agree_within_ten_minutes_is_accepted(path: Path) 
         assert life.reading(tag="9")[0] == 2.0
         assert life.reading() == (3.0, 0.0)
     assert runs(path) == [(1, None), (2, None), (3, 1)]
-
-
-# --- 6: positions ---------------------------------------------------------------------------------
 
 
 def test_a_position_counts_from_the_earliest_stamp_that_had_one(path: Path) -> None:

@@ -101,11 +101,6 @@ export function AlarmTodo({
   );
 }
 
-export function ResolvedNote({ alarm }: { alarm: Alarm }): JSX.Element {
-  const note = useTicking((at) => resolvedText(alarm, rosNow(store.get(), at)));
-  return <small className="faint">{note}</small>;
-}
-
 /** The value now and the worst value, in a column each. */
 export function AlarmFacts({
   alarm,

@@ -13,6 +13,7 @@ import {
 } from '../../alarms/arrange';
 import {
   calling,
+  countText,
   groupOf,
   heldList,
   itemsOf,
@@ -37,9 +38,8 @@ import { selectLatestTag } from '../../store/moment';
 import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
-import { HealthMark } from '../HealthMark';
 import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
-import { AlarmTimes, AlarmTodo, ResolvedNote } from './AlarmFacts';
+import { AlarmTimes, AlarmTodo } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
@@ -169,11 +169,7 @@ export function AlarmPanel(): JSX.Element {
             {(name === 'active' ? shown : seen)[name].length > 0 && (
               <Group
                 name={name}
-                count={
-                  filter === ''
-                    ? String(all[name].length)
-                    : `${counted[name].length}/${all[name].length}`
-                }
+                count={`${filter === '' ? '' : `${counted[name].length}/`}${countText(all, name)}`}
                 blocks={arranged(seen[name], order, sensors)}
               />
             )}
@@ -304,7 +300,9 @@ function CauseHeading({
   const todo = useApp((state) => todoNow(state, shown));
   if (!verdict) return null;
   const waiting = unacknowledged(own);
-  const oldest = group === 'resolved' ? undefined : oldestOf(shown);
+  const isOver = group === 'resolved';
+  // What was resolved last stands first.
+  const times = isOver ? shown[0]?.alarm : oldestOf(shown);
   return (
     <div
       className="alarm-cause"
@@ -321,15 +319,7 @@ function CauseHeading({
           if (only) showAlarm(only.alarm);
         }}
       >
-        {oldest ? (
-          <AlarmTimes alarm={oldest} first={null} verdict={verdict} />
-        ) : (
-          <span className="alarm-times">
-            <HealthMark verdict={verdict} />
-            {/* What was resolved last stands first. */}
-            {shown[0] && <ResolvedNote alarm={shown[0].alarm} />}
-          </span>
-        )}
+        {times && <AlarmTimes alarm={times} first={null} verdict={verdict} isOver={isOver} />}
         <span className="alarm-text">
           <span>
             <strong>{only ? S.alarmWhat(whereText(only.alarm), cause) : cause}</strong>{' '}

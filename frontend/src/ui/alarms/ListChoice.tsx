@@ -1,9 +1,8 @@
 import type { JSX } from 'react';
 
-import { calling } from '../../alarms/list';
+import { calling, countText } from '../../alarms/list';
 import { worstNow } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
-import { numberText } from '../../domain/format';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectIsDisconnected } from '../../store/moment';
@@ -45,7 +44,8 @@ export function ListChoice(): JSX.Element {
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList);
   const unacknowledged = calling(list);
-  const { length } = list.active;
+  const count = countText(list, 'active');
+  const hasAny = list.active.length > 0;
   const isKnown = useApp(selectAreAlarmsKnown);
   const isNow = useApp((state) => state.view.moment === null);
   const isDisconnected = useApp(selectIsDisconnected);
@@ -58,15 +58,15 @@ export function AlarmsLabel(): JSX.Element {
       {worst && <HealthShape verdict={worst} />}
       <span>
         {S.alarms}
-        {length > 0 && (
+        {hasAny && (
           <span data-testid="alarm-count" aria-hidden="true">
             {' '}
-            ({isNow ? numberText(length, 0) : S.alarmsNow(length)})
+            ({isNow ? count : S.alarmsNow(count)})
           </span>
         )}
       </span>
-      {isKnown && (length > 0 || !isDisconnected) && (
-        <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>
+      {isKnown && (hasAny || !isDisconnected) && (
+        <span className="unseen">, {S.alarmsCount(unacknowledged.length, count)}</span>
       )}
     </>
   );

@@ -11,7 +11,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarms: 'Alarme',
   listChoice: 'Neben der Karte',
   alarmsCount: (unseen, active) =>
-    active === 0 ? 'keine anstehend' : `${active} anstehend, ${unseen} davon nicht quittiert`,
+    active === '0' ? 'keine anstehend' : `${active} anstehend, ${unseen} davon nicht quittiert`,
   alarmsNow: (active) => `jetzt ${active}`,
   alarmGroups: {
     active: (count) => `Anstehend (${count})`,

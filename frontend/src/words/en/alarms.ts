@@ -5,10 +5,10 @@ export const ALARMS = {
   alarms: 'Alarms',
   listChoice: 'Beside the map',
   /** For screen readers, after the word. */
-  alarmsCount: (unseen: number, active: number): string =>
-    active === 0 ? 'none active' : `${active} active, ${unseen} not acknowledged`,
+  alarmsCount: (unseen: number, active: string): string =>
+    active === '0' ? 'none active' : `${active} active, ${unseen} not acknowledged`,
   /** After the word, while a past moment is shown. */
-  alarmsNow: (active: number): string => `${active} now`,
+  alarmsNow: (active: string): string => `${active} now`,
   /** How many, or "some/all" while the list is filtered. */
   alarmGroups: {
     active: (count: string): string => `Active (${count})`,

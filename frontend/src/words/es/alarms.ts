@@ -7,9 +7,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarms: 'Alarmas',
   listChoice: 'Junto al mapa',
   alarmsCount: (unseen, active) =>
-    active === 0
+    active === '0'
       ? 'ninguna activa'
-      : `${counted(active, 'activa', 'activas')}, ${unseen} sin reconocer`,
+      : `${active} ${active === '1' ? 'activa' : 'activas'}, ${unseen} sin reconocer`,
   alarmsNow: (active) => `${active} ahora`,
   alarmGroups: {
     active: (count) => `Activas (${count})`,

@@ -7,7 +7,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarms: 'Alarmen',
   listChoice: 'Naast de kaart',
   alarmsCount: (unseen, active) =>
-    active === 0 ? 'geen actief' : `${active} actief, waarvan ${unseen} niet bevestigd`,
+    active === '0' ? 'geen actief' : `${active} actief, waarvan ${unseen} niet bevestigd`,
   alarmsNow: (active) => `nu ${active}`,
   alarmGroups: {
     active: (count) => `Actief (${count})`,

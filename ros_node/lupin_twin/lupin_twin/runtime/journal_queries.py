@@ -14,7 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
@@ -37,7 +37,7 @@ _ELSEWHERE: Final = {
 
 AnswerT = TypeVar("AnswerT")
 # Any function of a connection, which calls `should_stop` between steps of its own.
-Search = Callable[[sqlite3.Connection, ShouldStop], AnswerT]
+Search = Callable[[Any, ShouldStop], AnswerT]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ import json
 import shutil
 import sqlite3
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,8 @@ def test_a_fleet_answers_for_a_site_as_its_serve_and_both_as_an_old_build_did(
         wait_until_equal(archive, journal)
         page.site(is_live=True)
         with httpx.Client(base_url=f"{page.url}/sites/gh1", timeout=PATIENCE_S) as site:
-            wait_for(lambda: site.get("/api/alarms").status_code == 200, "its alarms")
+            for http in (serve.http, site):
+                wait_for(partial(has_alarms_of_log, http), "its alarms")
             found = {path: query(serve.http, path) for path, _ in requested}
             different = [path for path, answer in found.items() if query(site, path) != answer]
     assert different == [], different
@@ -53,6 +55,11 @@ def test_a_fleet_answers_for_a_site_as_its_serve_and_both_as_an_old_build_did(
     assert len(old) > 100
     changed = [path for path, it in old.items() if not still_says(it, found[path])]
     assert changed == [], changed
+
+
+def has_alarms_of_log(http: httpx.Client) -> bool:
+    answer = http.get("/api/alarms")
+    return answer.status_code == 200 and answer.json()["source"] == "journal"
 
 
 def still_says(old: Any, new: Any) -> bool:

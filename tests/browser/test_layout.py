@@ -263,18 +263,6 @@ def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(
     expect(driver).to_have_attribute("title", f"Tag {long}: Temperature 79.0\u00a0°C, above 35.0")
 
 
-def test_the_table_stays_in_place_while_tags_arrive(running: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(running.url)
-    table = hmi.page.locator(".table-scroll")
-    # Each sorts above the present ones, as the robot meets them in no order.
-    for first in range(60, 0, -20):
-        ids = [str(first + i) for i in range(20)]
-        running.peer.observe(*(scan(i, {"temperature": 20.0}, at=(1, 1)) for i in ids))
-        expect(hmi.row(ids[-1])).to_be_attached()
-        assert table.evaluate("table => table.scrollTop") == 0
-    expect(hmi.row("20")).to_be_in_viewport()
-
-
 def stands_at(hmi: Hmi, filter_bar: list[Box]) -> bool:
     return places(hmi, ".filter-bar") == filter_bar
 

@@ -12,7 +12,6 @@ from tests.bench.greenhouse_double import greenhouse_of
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
 from tests.browser.places import place
 from tests.browser.test_accessibility import violations
-from tests.support.messages import scan
 from tests.support.web import Bridge
 
 TAGS = 2_000
@@ -118,15 +117,3 @@ def test_all_rows_have_the_same_height(open_greenhouse: OpenGreenhouse, tags: in
         "rows => rows.map(row => row.getBoundingClientRect().height)"
     )
     assert len(set(heights)) == 1
-
-
-def test_the_table_stays_in_place_while_tags_arrive(running: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(running.url)
-    table = hmi.page.locator(".table-scroll")
-    # Each sorts above the present ones, as the robot meets them in no order.
-    for first in range(60, 0, -20):
-        ids = [str(first + i) for i in range(20)]
-        running.peer.observe(*(scan(i, {"temperature": 20.0}, at=(1, 1)) for i in ids))
-        expect(hmi.row(ids[-1])).to_be_attached()
-        assert table.evaluate("table => table.scrollTop") == 0
-    expect(hmi.row("20")).to_be_in_viewport()

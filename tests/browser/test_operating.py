@@ -6,7 +6,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hmi import Hmi, OpenPage
+from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.browser.places import place, places
 from tests.support.web import Bridge
 
@@ -23,6 +23,25 @@ def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: 
     names = hmi.page.locator(".sensors label")
     expect(names).to_have_count(8)
     assert len({place(name).top for name in names.all()}) == 1
+
+
+def test_the_row_of_sensors_fades_where_there_are_more(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(greenhouse.url, viewport=PHONE)
+    row = hmi.page.locator(".sensor-picker")
+    expect(row).to_have_attribute("data-more", "after")
+    expect(row).to_have_css("mask-image", re.compile("gradient"))
+    hmi.choose_sensor("Dew margin")
+    expect(row).to_have_attribute("data-more", "before")
+    # In a wider window they wrap, and all of them are in sight.
+    for width in (700, 1100, 1440, 3840):
+        hmi.resize(width, 900)
+        expect(row).to_have_attribute("data-more", "")
+        expect(row).to_have_css("mask-image", "none")
+        last, bar = places(hmi, ".sensors label:last-child", ".sensor-picker")
+        assert bar.left < last.left < last.right <= bar.right
+        assert last.bottom < bar.bottom
 
 
 def test_a_sensor_has_its_colours_texts_legend_and_column(hmi: Hmi) -> None:

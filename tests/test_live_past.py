@@ -186,7 +186,10 @@ def test_a_flood_of_expensive_queries_loses_no_observation(domain: int, tmp_path
         Peer(domain, "robot") as robot,
         Peer(domain, "curious") as curious,
     ):
-        robot.wait_for_twin()
+        # Once the first has arrived, so does all that a topic holds; until then, the oldest go.
+        robot.observe(scan("beside", {"co2": 0.0}, stamp_s=LATER - 0.5))
+        first = f"SELECT 1 FROM scan WHERE stamp_ns = {stamp_ns(LATER - 0.5)}"
+        wait_for(lambda: select(journal, first), "the first in the journal")
         questions = (
             (GetStateAt, STATE_AT, GetStateAt.Request(at=stamp(LATER - 1.0))),
             (GetHistory, HISTORY, GetHistory.Request(tag_id="t0", sensor_type="~scans")),

@@ -209,4 +209,4 @@ def test_nothing_covers_the_label_of_a_stopped_robot(site: Bridge, open_page: Op
     # The space before it may stand by itself at the end of a line.
     is_hit = """at => [...at.getClientRects()].filter(it => it.width > 9).every(
       it => at.contains(document.elementFromPoint(it.right - 5, it.y + it.height / 2)))"""
-    assert order.evaluate(is_hit)
+    hmi.expect(lambda: bool(order.evaluate(is_hit)), "all of the order in sight")

@@ -195,18 +195,18 @@ class Access:
                     parse(text)
             except ValueError as error:
                 raise SettingError(f"{settings.called(name)}: {error}") from None
-        path = accounts_path(settings)
-        if settings.accounts and not path.exists():
+        people = People(
+            accounts_path(settings),
+            None if token is None else Credentials(token, called),
+            is_proxied=bool(settings.proxy_user_header),
+        )
+        if settings.accounts and not people.has_file:
             # A mistyped path would otherwise open the bridge to everybody, and say nothing.
             why = "%s: %s does not exist; until it does, nobody is asked for a name and password"
-            log.warning(why, settings.called("accounts"), path)
+            log.warning(why, settings.called("accounts"), accounts_path(settings))
         return cls(
             AccessPolicy(settings.host, settings.allow_origin, settings.allow_host),
-            people=People(
-                path,
-                None if token is None else Credentials(token, called),
-                is_proxied=bool(settings.proxy_user_header),
-            ),
+            people=people,
             site=settings.site,
             is_fleet=is_fleet,
         )

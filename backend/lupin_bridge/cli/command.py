@@ -155,7 +155,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options, unknown = parser().parse_known_args(own)
     if unknown:
         name = unknown[0].partition("=")[0]
-        known = [option(spec.name) for spec in table()] if options.role in ROLES else []
+        known = map(option, vars(options).keys() - {"role"}) if options.role in ROLES else ()
         is_of_ros = name in {*_RULES, "--params-file"}
         remedy = ": put it after --ros-args" if is_of_ros else meant(name, known)
         _fail(f"{name} is not an option of {options.role}{remedy}")

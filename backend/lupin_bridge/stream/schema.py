@@ -392,7 +392,7 @@ class HistoryReading(Contract):
 
 
 class SensorHistory(Contract):
-    """The past values of one sensor at one tag, oldest first."""
+    """The past values of one sensor, or quantity derived from a scan, at one tag, oldest first."""
 
     name: str
     values: list[HistoryReading]

@@ -113,6 +113,9 @@ describe('table', () => {
     expect(cell('9', 'co2')).toContain('no sensor');
     expect(cell('10', 'temperature')).toBe('high Temperature above 35.0\u00a0°C: 40.0');
     expect(row('9').textContent).toContain('rose91');
+    // Below the name where the column has no room; without a species there is nothing to say.
+    const below = ['9', '10'].map((id) => row(id).querySelector('.row-species')?.textContent);
+    expect(below).toEqual(['rose', undefined]);
     expect(row('10').dataset['health']).toBe('critical');
     expect(row('2').dataset['health']).toBe('unknown');
     const why = row('9').querySelector('.cell-health');

@@ -7,8 +7,9 @@ import httpx
 import pytest
 
 from lupin_bridge.access.credentials import MAX_COOKIE_BYTES
-from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS
+from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS, Access
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
+from lupin_bridge.settings import Settings
 from lupin_bridge.stream import schema
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.messages import occupancy_grid, scan
@@ -272,7 +273,7 @@ def test_an_impossible_host_or_origin_is_refused_at_the_start(
 
 
 def test_accounts_that_are_missing_and_listening_beyond_loopback_are_warnings(
-    tmp_path: Path,
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     missing = tmp_path / "acounts.sqlite"
     with served("--host", "0.0.0.0", "--accounts", str(missing)) as live:
@@ -283,6 +284,10 @@ def test_accounts_that_are_missing_and_listening_beyond_loopback_are_warnings(
         assert "without LUPIN_TOKEN" in warnings[1]
         assert "without --tls-cert" in warnings[2]
         assert live.get("/api/state").status_code == 200, "it goes by its addresses"
+    # As in a folder of somebody else: whether there is a file cannot be seen.
+    unseen = Settings(accounts=str(tmp_path / ("x" * 300)))
+    assert Access.of(unseen, None).is_closed
+    assert "does not exist" not in caplog.text
 
 
 ELSEWHERE = ["/", "/nowhere", "/ws/state"]

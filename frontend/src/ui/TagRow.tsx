@@ -86,7 +86,7 @@ export const TagRow = memo(function TagRow(props: Props): JSX.Element {
         <button type="button" className="row-button" aria-pressed={selected}>
           <bdi>{shown(tag.id, 24)}</bdi>
           {area !== '' && <small className="faint">{shown(area, 24)}</small>}
-          {has('species') && (
+          {has('species') && tag.species !== '' && (
             <small className="row-species faint">{speciesText(tag.species, 28)}</small>
           )}
         </button>

@@ -113,6 +113,8 @@ describe('table', () => {
     expect(cell('9', 'co2')).toContain('no sensor');
     expect(cell('10', 'temperature')).toBe('high Temperature above 35.0\u00a0°C: 40.0');
     expect(row('9').textContent).toContain('rose91');
+    // Nor a sign for one that is not known below the tag's number.
+    expect(row('2').querySelector('th')?.textContent).toMatch(/^2(?!␣)/);
     expect(row('10').dataset['health']).toBe('critical');
     expect(row('2').dataset['health']).toBe('unknown');
     const why = row('9').querySelector('.cell-health');

@@ -208,6 +208,9 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         expect(hmi.app).to_have_attribute("data-moment", shown)
         expect(hmi.card("a")).to_contain_text("43.5")
         expect(hmi.test_id("card-chart")).to_have_attribute("data-state", "ready")
+        hmi.resize(**WIDE)
+        room = hmi.page.locator(".alarms")
+        hmi.expect(lambda: place(room).bottom > place(room).top + 200, "alarms above the card")
         # The list is still the current one.
         expect(fact(row, "now")).to_contain_text("now 42.0")
         hmi.page.locator(".alarm-go").click()

@@ -286,6 +286,11 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     charts.click()
     expect(hmi.test_id("chart-view")).to_be_visible()
     expect(card).to_be_hidden()
+    # Without room for all charts they scroll, and each is high enough to be read.
+    hmi.resize(360, 600)
+    inside = plot(hmi).locator(".u-over")
+    hmi.expect(lambda: place(inside).bottom > place(inside).top + 100, "a chart to be read")
+    hmi.resize(**PHONE)
     hmi.test_id("chart-view").get_by_role("button", name="Close").click()
     # Back to where it was opened, not to the map or the top of the card.
     expect(card).to_be_visible()

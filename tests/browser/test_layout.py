@@ -344,6 +344,9 @@ def test_many_sensors_leave_the_reasons_their_room(running: Bridge, open_page: O
     expect(hmi.cell("1", "sensor4")).to_be_attached()
     cell = hmi.row("1").locator(".cell-health")
     hmi.expect(lambda: cell.evaluate("e => e.clientWidth") > 130, "room for the reasons")
+    # They have two lines: the status is its shape, and a word for screen readers.
+    word = cell.locator(".health-mark > span")
+    hmi.expect(lambda: word.evaluate("e => e.clientWidth") == 1, "no word")
 
 
 # Elements beyond the window, or beyond their own box, that are no scrollable list. Of a column's

@@ -232,6 +232,7 @@ class _Page:
         raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
         numbers, verdict = reason["kind"] == "range", self._words["verdicts"][reason["verdict"]]
         number, at_end = partial(self._number, sensor=reason["sensor"]), ""
+        worst = number(alarm["worst"], limit=limit)
         if tag is not None:
             pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
             name = reason["sensor"] if numbers else reason["kind"]
@@ -247,7 +248,7 @@ class _Page:
             "end": "" if cleared is None else self._clock(cleared),
             "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
             "at_end": at_end,
-            "worst": f"{number(alarm['worst'], limit=limit)} ({verdict})".strip(),
+            "worst": f"{worst} ({verdict})" if worst else verdict,
             "limits": self._limits(reason, tag) if numbers else "",
             "who": self._who(alarm),
         }

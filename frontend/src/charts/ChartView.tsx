@@ -22,7 +22,9 @@ import { pointsFor, useCharts, useSensorsOf } from './useLines';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Least height of each chart of a tag, and of the one chart of a sensor, without the times; CSS pixels. */
-const LEAST_HEIGHT = { tag: 64, sensor: 152 } as const;
+const LEAST_HEIGHT = { tag: 80, sensor: 152 } as const;
+/** The same where the charts scroll: all of them together are out of sight anyway. */
+const SCROLLED_HEIGHT = 120;
 /** Height of a chart's title, CSS pixels. */
 const AROUND = 32;
 
@@ -60,7 +62,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];
-  const height = Math.max(least, Math.floor(room) - AROUND);
+  const scrolls = room - AROUND < least;
+  const height = scrolls ? Math.max(least, SCROLLED_HEIGHT) : Math.floor(room) - AROUND;
 
   const zoom = (factor: number) => (): void => {
     const nowS = rosNow(store.get(), now());
@@ -144,7 +147,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         {!isTable &&
           withLines.map((model, index) => {
             // The shared times, below the last chart, are out of sight if the charts scroll.
-            const hasTimes = index === withLines.length - 1 || room - AROUND < least;
+            const hasTimes = index === withLines.length - 1 || scrolls;
             return (
               <PlotView
                 // A single line has other colours.

@@ -24,12 +24,12 @@ test('messages that could not be read are counted, and the last is named', () =>
     receive(withUnread('state.seq: is missing'));
   });
   expect(lines()).toEqual([
-    'A message from the server could not be read and was dropped. The last: state.seq: is missing',
+    'A message from the server could not be read and was dropped. Most recent: state.seq: is missing',
   ]);
   flush(() => {
     receive(withUnread('a message that is no JSON'));
   });
-  expect(lines()[0]).toMatch(/^2 messages .* The last: a message that is no JSON$/);
+  expect(lines()[0]).toMatch(/^2 messages .* Most recent: a message that is no JSON$/);
   flush(() => {
     receive({ unread: null });
   });
@@ -58,7 +58,7 @@ test('what the twin dropped is reported with its count, and a pause as one', () 
   render(<Troubles />);
   expect(lines()).toEqual([
     'Time is paused. The simulation or recording is paused, so ages do not increase.',
-    'The twin dropped 12 messages in the last few minutes. The last: frame odom, expected map',
+    'The twin dropped 12 messages in the last few minutes. Most recent: frame odom, expected map',
   ]);
 });
 

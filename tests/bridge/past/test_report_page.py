@@ -222,6 +222,8 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
         alarms=[alarm()], tags=[replace(tags[0], flower=Flower(bug_count=2), looked_at_ns=read)]
     )
     assert "7 06:01 2 (06:10) 3" in page
+    failed = {**alarm()["reason"], "verdict": "unknown", "kind": "scan_failed", "value": None}
+    assert "7 06:01 unknown " in page_of(alarms=[alarm(reason=failed, worst=None)])
 
 
 @pytest.mark.parametrize(

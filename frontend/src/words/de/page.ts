@@ -68,7 +68,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Eine Nachricht vom Server war nicht lesbar und wurde verworfen.'
       : `${count} Nachrichten vom Server waren nicht lesbar und wurden verworfen.`,
-  unreadLast: (why) => `Die letzte: ${why}`,
+  unreadLast: (why) => `Zuletzt: ${why}`,
   paused: 'Die Zeit ist angehalten.',
   pausedHint: 'Simulation oder Aufzeichnung sind angehalten; die Messwerte altern nicht.',
   mixture:

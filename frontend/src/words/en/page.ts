@@ -70,7 +70,7 @@ export const PAGE = {
     count === 1
       ? 'A message from the server could not be read and was dropped.'
       : `${count} messages from the server could not be read and were dropped.`,
-  unreadLast: (why: string): string => `The last: ${why}`,
+  unreadLast: (why: string): string => `Most recent: ${why}`,
   paused: 'Time is paused.',
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
   mixture: 'More than one twin sends data. The page shows a mixture of them: stop all but one.',

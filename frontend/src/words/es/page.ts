@@ -66,7 +66,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Un mensaje del servidor no se pudo leer y se descartó.'
       : `${count} mensajes del servidor no se pudieron leer y se descartaron.`,
-  unreadLast: (why) => `El último: ${why}`,
+  unreadLast: (why) => `Último: ${why}`,
   paused: 'El tiempo está en pausa.',
   pausedHint: 'La simulación o la grabación está en pausa; la antigüedad no aumenta.',
   mixture: 'Más de un gemelo envía datos. La página muestra una mezcla: detenga todos menos uno.',

@@ -319,9 +319,9 @@ class NodeUtilities:
 
     def lose(self, count: int, topic: str) -> None:
         """Count and report messages that came faster than they were read."""
-        text = f"messages on {topic}: they arrived too fast"
-        self._drops.add(Reason.LOST.value, f"lost {text}", time.monotonic(), count)
-        self.warn((Reason.LOST, topic), f"lost {count} {text} to be read")
+        text = f"messages on {topic} arrived too fast"
+        self._drops.add(Reason.LOST.value, text, time.monotonic(), count)
+        self.warn((Reason.LOST, topic), f"lost {count} messages on {topic}: they arrived too fast")
 
     def late(self, late: Late, topic: str) -> None:
         """Count and report a producer whose stamps stay behind its own earlier ones."""

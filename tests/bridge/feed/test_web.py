@@ -196,7 +196,9 @@ async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_
                 await until(lambda: len(reported) == lost, "a sign of life")  # noqa: B023
                 second = iter(range(1_000))
                 await until(lambda: len(rejoined()) == 6 * lost, "its silence")  # noqa: B023
-    assert rejoined() == ["30", "60", "120", "240", "480", "780"] * 2
+    expected_s = [30, 60, 120, 240, 480, 780] * 2
+    # On a busy machine, another task may have looked at the clock in between.
+    assert [int(it) for it in rejoined()] == pytest.approx(expected_s, abs=2)
 
 
 async def test_refusals_are_the_services_and_no_wait_is_endless(

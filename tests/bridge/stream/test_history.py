@@ -46,6 +46,8 @@ def test_the_history_equals_the_simplest_one(writes: list[Scan | Inspection], co
         for name, value in readings.items():
             expected.setdefault(name, []).append({"stamp": stamp(stamp_ns), "value": value})
     assert {it["name"]: it["values"] for it in past["sensors"]} == expected
+    sources = [(it.stamp_ns, number, it.source) for number, it in enumerate(writes) if it.source]
+    assert past["source"] == (max(sources)[2] if sources else None)
 
 
 @given(

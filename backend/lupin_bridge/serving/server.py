@@ -394,8 +394,6 @@ async def serve(
     gc.collect()
     gc.freeze()
     url = address_of(listener, "https" if settings.tls_cert else "http")
-    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
-    supervisor.ready(f"serving {url}")
     tasks = [asyncio.create_task(supervisor.send_watchdog(ailment), name="watchdog")]
     server.config.load()
     if server.config.ssl is not None:
@@ -403,6 +401,9 @@ async def serve(
         certificates = Certificates(settings.tls_cert, settings.tls_key, server.config.ssl)
         asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, certificates.look)
         tasks.append(asyncio.create_task(certificates.watch(), name="certificates"))
+    # Last: a certificate's renewal that sees the address may send SIGHUP, which ends others.
+    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
+    supervisor.ready(f"serving {url}")
     try:
         await server.serve(sockets=[listener])
     finally:

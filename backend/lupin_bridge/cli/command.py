@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-import math
 import os
 import re
 import signal
@@ -189,7 +188,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             secrets,
             ros_args,
             feed_args,
-            recording=getattr(options, "recording", None) or [],
+            recording=getattr(options, "recording", None),
         )
     except SettingError as error:
         _fail(str(error))
@@ -222,12 +221,8 @@ def _feed_args(options: argparse.Namespace) -> list[str]:
     """The arguments of what feeds a demo: of the patrol, or with `--from`, of the player."""
     if options.role != "demo":
         return []
-    given = [f"--start={options.start}"] if options.start is not None else []
-    given += ["--loop"] if options.loop else []
-    given += [f"--skip-gaps={options.skip_gaps}"] if options.skip_gaps < math.inf else []
+    given = []
     is_patrol = options.recording is None
-    if is_patrol and given:
-        _fail(f"{given[0].partition('=')[0]} is for --from FILE.mcap")
     if not is_patrol and options.seed is not None:
         _fail("--seed is for the patrol, which --from FILE.mcap replaces")
     speeds = PATROL_SPEEDS if is_patrol else PLAYER_SPEEDS
@@ -294,25 +289,9 @@ def parser() -> argparse.ArgumentParser:
                 "--from",
                 dest="recording",
                 metavar="FILE.mcap",
-                nargs="+",
-                help="play this recording instead of the patrol: one file, all of its files, or "
-                "their folder. It feeds a twin of its own, with the time of the recording and a "
-                "temporary journal",
-            )
-            own.add_argument(
-                "--start",
-                type=_seconds,
-                metavar="SECONDS",
-                help="start this long after the first message of the recording; earlier messages "
-                "are published at once (default: 0)",
-            )
-            own.add_argument("--loop", action="store_true", help="play it again from its end")
-            own.add_argument(
-                "--skip-gaps",
-                type=_seconds,
-                default=math.inf,
-                metavar="SECONDS",
-                help="skip silences of the recording longer than this (default: wait)",
+                help="play this recording instead of the patrol: a file, or the folder of its "
+                "files. It feeds a twin of its own, with the time of the recording and a temporary "
+                "journal",
             )
     journal.add_parser(roles)
     administration.add_archive(roles)
@@ -320,16 +299,6 @@ def parser() -> argparse.ArgumentParser:
     adapt.add_options(add_role(roles, "adapt", adapt.HELP))
     administration.add_people(roles)
     return made
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0 to 1e9")
-    return value
 
 
 def _prepare_process() -> None:

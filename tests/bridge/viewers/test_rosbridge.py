@@ -185,8 +185,6 @@ class Everything:
         "level": ("octet", b"\x02"),
         "ratio": ("double", math.nan),
         "cells": ("sequence<int8>", array("b", [-1, 0, 100])),
-        "image": ("sequence<uint8>", array("B", [1, 2, 255])),
-        "key": ("uint8[2]", np.array([7, 8], np.uint8)),
         "points": ("sequence<float, 9>", array("f", [0.5, math.inf])),
         "matrix": ("double[2]", np.array([1.0, 2.0])),
         "names": ("sequence<string>", ["a", "b"]),
@@ -201,7 +199,7 @@ class Everything:
         return {name: kind for name, (kind, _) in cls.FIELDS.items()}
 
 
-def test_json_has_lists_base64_for_bytes_and_null_for_what_is_not_finite() -> None:
+def test_json_has_lists_and_null_for_what_is_not_finite() -> None:
     assert json.loads(json_of(Everything())) == {
         "stamp": {"sec": 5, "nanosec": 6},
         "text": "é",
@@ -209,8 +207,6 @@ def test_json_has_lists_base64_for_bytes_and_null_for_what_is_not_finite() -> No
         "level": 2,
         "ratio": None,
         "cells": [-1, 0, 100],
-        "image": "AQL/",
-        "key": "Bwg=",
         "points": [0.5, None],
         "matrix": [1.0, 2.0],
         "names": ["a", "b"],

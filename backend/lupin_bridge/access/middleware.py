@@ -27,7 +27,6 @@ from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.credentials import (
     WRITER,
     AccountError,
-    CookieTooLong,
     Credentials,
     Person,
 )
@@ -305,11 +304,7 @@ class AccessControl:
         if path == SIGN_IN:
             return None  # the route checks name and password, if there are accounts
         # A wrong cookie does not count as a guess: nobody can forge one without the token.
-        try:
-            person = people.by_cookies(request.scope["headers"])
-        except CookieTooLong as error:
-            return _refusal(431, str(error))
-        return person or _sign_in_first(request)
+        return people.by_cookies(request.scope["headers"]) or _sign_in_first(request)
 
     def _check_header(self, people: People, header: str, client: str) -> Response | Person:
         now_s = time.monotonic()

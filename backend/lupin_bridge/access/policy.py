@@ -2,9 +2,8 @@
 
 Anybody may send X-Forwarded-For and X-Forwarded-Proto, so they are believed only from a proxy that
 the operator has named. They replace `client` and `scheme` of the scope, and so count for limits,
-logs, wrong tokens and the check of origins. The middleware of uvicorn takes an address with a port,
-as some proxies write it, for a new client each time. It also knows no IPv4 address on a socket that
-listens for IPv6, and reads only the last of several lines.
+logs, wrong tokens and the check of origins. The middleware of uvicorn knows no IPv4 address on a
+socket that listens for IPv6, and reads only the last of several lines.
 
 A browser sends any page's requests to a bridge that its machine can reach. Four rules keep foreign
 pages from reading anything through it, or making it compute:
@@ -43,8 +42,6 @@ _PATH_PREFIX: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 _HEADER: Final = re.compile(r"[A-Za-z][A-Za-z0-9-]{0,63}")
 # Key in a request's state: whom a trusted proxy names.
 PROXY_USER_KEY: Final = "proxy_user"
-# "10.0.0.7:1234" and "[fd00::7]:1234", as some proxies write an address.
-_WITH_PORT: Final = re.compile(r"\[(?P<v6>[^\]]+)\](?::\d+)?|(?P<v4>[\d.]+):\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,12 +176,8 @@ def _network(text: str, called: str) -> IPv4Network | IPv6Network:
 
 
 def _address(text: str) -> IPv4Address | IPv6Address | None:
-    text = text.strip()
-    match = _WITH_PORT.fullmatch(text)
-    if match is not None:
-        text = match["v6"] or match["v4"]
     try:
-        ip = ip_address(text.partition("%")[0])
+        ip = ip_address(text.strip().partition("%")[0])
     except ValueError:
         return None
     return ip.ipv4_mapped or ip if isinstance(ip, IPv6Address) else ip

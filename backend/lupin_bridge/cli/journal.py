@@ -29,7 +29,7 @@ from lupin_bridge.console import (
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.query_string import MAX_SECONDS, moment
-from lupin_bridge.settings import SettingError, settings_from, variable
+from lupin_bridge.settings import SettingError, settings_from
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.checking import (
     RunExtent,
@@ -39,7 +39,6 @@ from lupin_twin.journal.checking import (
     row_counts,
     sensors_of,
     size_of,
-    tags_of,
 )
 from lupin_twin.journal.paths import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.rebuild import handle_interrupts, vacuum
@@ -114,14 +113,6 @@ def add_parser(roles: Roles) -> None:
                 "--from", dest="start", metavar="TIME", help=f"start of the period: {when}"
             )
             own.add_argument("--to", dest="end", metavar="TIME", help=f"end, exclusive: {when}")
-            own.add_argument("--tag", metavar="ID", help="this tag only")
-            own.add_argument("--sensor", metavar="NAME", help="this sensor only")
-            own.add_argument(
-                "--sensors", metavar="FILE", help=f"sensors file (default: {variable('sensors')})"
-            )
-            own.add_argument(
-                "--config", metavar="FILE", help=f"settings file (default: {variable('config')})"
-            )
 
 
 def add_which(parser: argparse.ArgumentParser) -> None:
@@ -317,31 +308,16 @@ def _export(path: Path, options: argparse.Namespace, environ: Mapping[str, str])
         raise CommandError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
-    given = {"sensors": options.sensors}
-    sensors = Criteria.of(settings_from(given, environ, options.config)).sensors
+    sensors = Criteria.of(settings_from({}, environ)).sensors
     with closing(_reader(path)) as connection:
-        lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
         standard(bodies.CSV_HEADER)
-        is_empty = True
-        for lot in lots:
+        for lot in rows(connection, start_ns, end_ns):
             standard(bodies.csv_lines(lot, sensors))
-            is_empty = False
-        if is_empty:
-            tags, names = _some(tags_of(connection)), _some(sensors_of(connection))
-            say(f"nothing matches; the journal has the tags {tags} and the sensors {names}")
     return 0
-
-
-def _some(names: list[str]) -> str:
-    more = f" and {len(names) - _MAX_SHOWN:,} more" if len(names) > _MAX_SHOWN else ""
-    return (", ".join(names[:_MAX_SHOWN]) or "none") + more
 
 
 def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:
     target: Path = options.recording
-    for name in ("tag", "sensor"):
-        if getattr(options, name) is not None:
-            raise CommandError(f"--{name} is for CSV: {target} holds whole observations")
     if target.suffix != SUFFIX:
         raise CommandError(f"{target} does not end in {SUFFIX}, as a recording must")
     try:

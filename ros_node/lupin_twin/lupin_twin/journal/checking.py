@@ -173,11 +173,6 @@ def quarantined_beside(path: Path) -> list[tuple[str, int]]:
     ]
 
 
-def tags_of(connection: sqlite3.Connection) -> list[str]:
-    """The ids of all tags that were observed."""
-    return [tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM series ORDER BY tag")]
-
-
 def sensors_of(connection: sqlite3.Connection) -> list[str]:
     """The names of all sensors."""
     names: set[str] = set()

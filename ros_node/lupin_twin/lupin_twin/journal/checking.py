@@ -141,7 +141,7 @@ def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: 
 
 # --- what is in it --------------------------------------------------------------------------------
 
-_COUNTED: Final = ("scan", "look", "place", "hour")
+_COUNTED: Final = ("scan", "look", "place")
 
 # A run, and the stamps of its first and last attempts, deleted ones included; None: it has none.
 RunExtent = tuple[Run, int | None, int | None]
@@ -161,16 +161,6 @@ def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
         "SELECT count(*) FROM scan WHERE status != 0 AND is_copy = 0"
     ).fetchone()
     return rows
-
-
-def quarantined_beside(path: Path) -> list[tuple[str, int]]:
-    """(name, bytes) of the damaged journals that were quarantined, the latest last."""
-    prefix = f"{path.name}.damaged-"
-    return [
-        (file.name, size_of(file))
-        for file in sorted(path.parent.iterdir())
-        if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
-    ]
 
 
 def sensors_of(connection: sqlite3.Connection) -> list[str]:

@@ -14,7 +14,6 @@ older ones that could not be written are dropped.
 from __future__ import annotations
 
 import asyncio
-import logging
 import struct
 import uuid
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
@@ -143,8 +142,6 @@ def unadvertise(ids: Iterable[int]) -> bytes:
 
 # --- one client's session -------------------------------------------------------------------------
 
-log = logging.getLogger(__name__)
-
 
 @dataclass(slots=True)
 class Counts:
@@ -271,7 +268,6 @@ class Offer:
         self.counts = Counts()
         self._source = source
         self._ids = count(1)
-        self._missing: set[str] = set()
         self._followers: dict[Callable[[], None], None] = {}
         self._following: Periodic
         self._looking: Shared[None] = Shared()
@@ -304,21 +300,14 @@ class Offer:
         wanted += [Topic(kind, "", name) for name, kind in sorted(published.items())[:MAX_LAYERS]]
         known = {channel.topic: channel for channel in self.channels.values()}
         found = [known.get(topic) or await self._channel(topic) for topic in wanted]
-        channels = {channel.id: channel for channel in found if channel is not None}
+        channels = {channel.id: channel for channel in found}
         if channels != self.channels:
             self.channels = channels
             for on_change in list(self._followers):
                 on_change()
 
-    async def _channel(self, topic: Topic) -> Channel | None:
-        if topic.type_name in self._missing:
-            return None
-        try:
-            text = await asyncio.to_thread(schema_text, topic.type_name)
-        except LookupError as error:
-            self._missing.add(topic.type_name)
-            log.warning("%s is not offered to viewers: %s", topic.name, error)
-            return None
+    async def _channel(self, topic: Topic) -> Channel:
+        text = await asyncio.to_thread(schema_text, topic.type_name)
         return Channel(next(self._ids), topic, text)
 
 

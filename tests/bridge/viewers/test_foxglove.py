@@ -29,7 +29,7 @@ NAMES = TwinNames(
     *("/n/twin/field/", "/n/twin/tags", "/n/twin/planters"),
 )
 OWN = ["/n/twin/state", "/o", "/d", "/map", "/diag"]
-POINTS, MARKERS = "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray"
+POINTS = "sensor_msgs/msg/PointCloud2"
 
 
 class Source:
@@ -60,14 +60,8 @@ class Source:
 
 @pytest.fixture(autouse=True)
 def schemas(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The text of every type except one, whatever is installed."""
-
-    def text(type_name: str) -> str:
-        if type_name == MARKERS:
-            raise LookupError(f"the message type {type_name} is not installed")
-        return f"# {type_name}"
-
-    monkeypatch.setattr(module, "schema_text", text)
+    """The text of every type, whatever is installed."""
+    monkeypatch.setattr(module, "schema_text", lambda type_name: f"# {type_name}")
 
 
 def offer_of(source: Source) -> Offer:
@@ -97,9 +91,7 @@ async def test_the_topics_of_a_twin_and_the_published_layers_are_offered() -> No
     assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
 
 
-async def test_layers_are_bounded_and_a_topic_without_a_definition_is_left_out_and_warned_about(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+async def test_layers_are_bounded_and_end_with_ros() -> None:
     source = Source({f"/n/twin/field/s{n:03}": POINTS for n in range(MAX_LAYERS + 1)})
     offer = offer_of(source)
     await offer.look()
@@ -107,11 +99,6 @@ async def test_layers_are_bounded_and_a_topic_without_a_definition_is_left_out_a
     source.has_ended = True
     await offer.look()
     assert topics(offer) == OWN
-    offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
-    for _ in range(3):
-        await offer.look()
-    assert topics(offer) == OWN
-    assert caplog.text.count("is not offered to viewers") == 1
 
 
 async def test_followers_get_only_changes_and_an_id_is_never_reused(

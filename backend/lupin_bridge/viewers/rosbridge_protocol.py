@@ -175,16 +175,8 @@ _PLAIN: Final = _NUMBERS | {"boolean"}
 
 
 def json_of(message: Any) -> bytes:
-    """The message in JSON.
-
-    Raises:
-        ValueError: a text that is no Unicode.
-
-    """
-    try:
-        return orjson.dumps(_message(message))
-    except TypeError as error:
-        raise ValueError(str(error)) from error
+    """The message in JSON."""
+    return orjson.dumps(_message(message))
 
 
 def _array(values: Any) -> orjson.Fragment:

@@ -107,9 +107,7 @@ def patrolled(
     )
 
 
-def recorded(
-    files: Sequence[str], play_args: Sequence[str], ros_args: Sequence[str], folder: Path
-) -> Feed:
+def recorded(path: str, play_args: Sequence[str], ros_args: Sequence[str], folder: Path) -> Feed:
     """Feed the twin by a recording, which `lupin_bridge.bags.player` plays with these options.
 
     Its journal is in `folder`, for this recording alone. The twin subscribes to the topics as they
@@ -119,13 +117,13 @@ def recorded(
         lupin_bridge.bags.recording.RecordingError: it cannot be played.
 
     """
-    with Recording([Path(file) for file in files]) as recording:
+    with Recording(Path(path)) as recording:
         inputs = recording.inputs
     journal = folder / "journal.sqlite"
     topics = {INPUTS[kind].parameter: name for name, kind in inputs.items()}
     return Feed(
         "player",
-        ["lupin_bridge.bags.player", *files, *play_args, *ros_args],
+        ["lupin_bridge.bags.player", path, *play_args, *ros_args],
         _parameters(**topics, journal=str(journal), use_sim_time=True),
         "recorded",
     )
@@ -200,12 +198,12 @@ def run(
     ros_args: Sequence[str],
     feed_args: Sequence[str] = (),
     *,
-    recording: Sequence[str] = (),
+    recording: str | None = None,
 ) -> None:
     """Run a role until a signal ends it.
 
     `feed_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both. With `recording` (its files) they are those of its
+    a namespace or a remapping holds for both. With `recording` (its path) they are those of its
     player, which takes the patrol's place.
 
     Raises:

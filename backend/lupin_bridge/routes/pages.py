@@ -264,7 +264,7 @@ async def sign_in(request: Request) -> Response:
     people, person = _access_of(request).people, person_of(request)
     if people is None or not people.is_on:
         return error_response("this bridge needs no token: there is nothing to sign in to", 404)
-    address, ends_others = client_of(request), False
+    address = client_of(request)
     if "authorization" not in request.headers:
         if not people.has_file:  # a session must not renew itself
             return error_response(
@@ -274,11 +274,9 @@ async def sign_in(request: Request) -> Response:
         person = await while_client_waits(
             request, people.check(given.name, given.password, address)
         )
-        ends_others = given.ends_others
     begun = None
     if person is not None:
-        signing_in = people.sign_in(person, address, ends_others=ends_others)
-        begun = await while_client_waits(request, signing_in)
+        begun = await while_client_waits(request, people.sign_in(person, address))
     if begun is None:
         return error_response("there is no such account, or the password is wrong", 401)
     name, cookie, lasts_s = begun

@@ -37,7 +37,6 @@ class SignIn(_Given):
 
     name: str
     password: str
-    ends_others: bool = Field(default=False, description="sign this name out everywhere else")
 
 
 class _Keys(_Given):

@@ -273,7 +273,7 @@ class OfReportPage(OfReport):
     lang: Literal["en", "de", "nl", "es"] = parameter("language of the page", "en")
     time_zone: str | None = parameter(
         "time zone of the page's times, such as Europe/Amsterdam; default: the setting "
-        "`time_zone`; UTC if this machine does not know it"
+        "`time_zone`, also if this machine does not know the zone"
     )
 
 

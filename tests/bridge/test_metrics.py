@@ -56,7 +56,7 @@ def test_every_metric_exists_and_follows_what_happens(domain: int) -> None:
             [drop] = httpx.get(f"{url}/readyz", timeout=PATIENCE_S).json()["drops"]
             assert (drop["reason"], drop["count"]) == ("frame", 2)
             assert "'odom'" in drop["message"]
-        assert (after["lupin_clients"], after["lupin_tags_pinned"]) == (1.0, 1.0)
+        assert after["lupin_clients"] == 1.0
         assert after["lupin_frames_sent_total"] >= 2.0
         assert after["lupin_bytes_sent_total"] > 100.0
         assert after["lupin_push_seconds_count"] > before["lupin_push_seconds_count"]
@@ -116,6 +116,5 @@ def test_answers_are_counted_by_status_and_timed_by_route() -> None:
             'lupin_http_answers_total{status="429"} 2.0',
             'lupin_admission_refused_total{reason="client_rate"} 2.0',
             'lupin_http_seconds_count{route="field"} 3.0',
-            "lupin_work_abandoned_total 0.0",
         ):
             assert f"\n{line}\n" in metrics

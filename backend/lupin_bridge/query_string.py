@@ -248,9 +248,6 @@ class OfNotes(OfPeriod):
     """The parameters of `/api/notes`."""
 
     subject: str | None = parameter("only about this: `alarm:ID`, `tag:ID` or `site`; default: all")
-    kind: Literal["acknowledge", "shelve", "comment"] | None = parameter(
-        "only this kind; default: all"
-    )
 
 
 # The default length of a report's period: a shift.

@@ -242,13 +242,6 @@ class Bridge:
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
         yield from self.outward.counts()
-        known = self.estimates.known
-        trusted = {name: report.record.is_trusted for name, report in known.items()}
-        yield "lupin_estimate_trusted", {name: it for name, it in trusted.items() if it is not None}
-        yield (
-            "lupin_estimate_fit_failing",
-            {name: bool(report.fit_problem) for name, report in known.items()},
-        )
         # Counts that the twin does not report are absent, not zero.
         for name, counts in (
             ("lupin_dropped", None if latest is None else latest.counts),

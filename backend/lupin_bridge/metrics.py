@@ -48,11 +48,6 @@ METRICS: Final = {
     "lupin_journal_behind_seconds": gauge("seconds that the oldest of those has waited"),
     "lupin_journal_file_bytes": gauge("size of the journal file on disk"),
     "lupin_outward_connected": gauge("1 while the receiving side accepts messages", "channel"),
-    "lupin_estimate_trusted": gauge(
-        "1 while about as many scans as expected lie in the predicted range; absent: too few scans",
-        "sensor",
-    ),
-    "lupin_estimate_fit_failing": gauge("1 while the last fit of its model has failed", "sensor"),
     "lupin_outward_waiting": gauge(
         "changes of alarms not yet sent; MQTT: 0 if the broker has the current state", "channel"
     ),

@@ -1,17 +1,10 @@
 """Metrics as Prometheus reads them, from a real bridge with a real twin."""
 
-from typing import Any
-
 import httpx
 from prometheus_client.parser import text_string_to_metric_families
 from websockets.sync.client import connect
 
-from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import CONTENT_TYPE, METRICS, route_class
-from lupin_bridge.settings import Settings
-from lupin_twin.estimate.grading import Record, Tally
-from lupin_twin.runtime.estimates import Report
-from tests.bridge.test_bridge import Script
 from tests.support.access import BEARER, TOKEN, served
 from tests.support.messages import scan
 from tests.support.processes import limits, lupin_twin, url_of
@@ -64,22 +57,6 @@ def test_every_metric_exists_and_follows_what_happens(domain: int) -> None:
         assert (after["lupin_ros_thread_alive"], after["lupin_twin_live"]) == (1.0, 1.0)
         assert after["lupin_state_age_seconds"] < 3.0
         assert after["lupin_ros_callback_errors_total"] == 0.0
-
-
-def test_wrong_estimates_are_counted_by_sensor() -> None:
-    source: Any = Script()
-    bridge = Bridge(source, Settings())
-    right, wrong = (Record(1, tally, tally) for tally in (Tally(90, 81), Tally(90, 10)))
-    for name, record, problem in (("co2", right, "singular"), ("light", wrong, "")):
-        bridge.estimates.known[name] = Report(1, True, problem, record)
-    text = bridge.metrics.text().decode()
-    for name, sensor, value in (
-        ("trusted", "co2", 1.0),
-        ("trusted", "light", 0.0),
-        ("fit_failing", "co2", 1.0),
-        ("fit_failing", "light", 0.0),
-    ):
-        assert f'\nlupin_estimate_{name}{{sensor="{sensor}"}} {value}\n' in text
 
 
 def test_each_path_belongs_to_one_of_a_few_kinds() -> None:

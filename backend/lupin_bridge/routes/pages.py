@@ -20,7 +20,7 @@ from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
-from lupin_bridge.field import weighted
+from lupin_bridge.field import listed
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     computed,
@@ -176,19 +176,15 @@ async def no_page() -> Response:
 
 
 def language_of(request: Request, known: Collection[str]) -> str:
-    """One of `known`: what `?lang=` asks for, else the best of `Accept-Language`, else English.
+    """One of `known`: what `?lang=` asks for, else the first in `Accept-Language`, else English.
 
     As in the HMI, "de-AT" and "DE" are German, and an unknown language is English.
     """
     wanted = request.query_params.get("lang")
     if wanted is not None:
         return _known_language(wanted, known) or "en"
-    found = "en", 0.0
-    for tag, weight in weighted(list_header(request, "accept-language")):
-        language = _known_language(tag, known)
-        if language is not None and weight > found[1]:  # of equals the first
-            found = language, weight
-    return found[0]
+    accepted = listed(list_header(request, "accept-language"))
+    return next(filter(None, (_known_language(tag, known) for tag in accepted)), "en")
 
 
 def _known_language(tag: str, known: Collection[str]) -> str | None:

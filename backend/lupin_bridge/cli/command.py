@@ -28,7 +28,6 @@ from lupin_bridge.settings import (
     SettingError,
     Settings,
     limits_of,
-    meant,
     option,
     settings_from,
     strange_variables,
@@ -141,9 +140,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options, unknown = parser().parse_known_args(own)
     if unknown:
         name = unknown[0].partition("=")[0]
-        known = map(option, vars(options).keys() - {"role"}) if options.role in ROLES else ()
         is_of_ros = name in {*_RULES, "--params-file"}
-        remedy = ": put it after --ros-args" if is_of_ros else meant(name, known)
+        remedy = ": put it after --ros-args" if is_of_ros else ""
         _fail(f"{name} is not an option of {options.role}{remedy}")
     if options.role == "adapt":
         return adapt.run(options, ros_args)

@@ -146,7 +146,7 @@ GET_HISTORY: Final = Service(
 )
 GET_WRITES: Final = Service(
     "lupin_msgs/srv/GetWrites",
-    "all observations in the order in which they were received, for a follower",
+    "the rows of the log in order of arrival, for a copy of it",
     "twin/get_writes",
 )
 SERVICES: Final = (

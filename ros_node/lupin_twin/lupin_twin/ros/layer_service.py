@@ -20,7 +20,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
-from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS, Topic
+from lupin_twin.core.interfaces import LAYERS, LAYERS_BELOW, PLANTERS, TAGS, Topic
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
 from lupin_twin.field.engine import (
@@ -41,7 +41,6 @@ from lupin_twin.ros.layers import (
     points,
     tag_markers,
     tag_marks,
-    topics_of,
 )
 from lupin_twin.ros.parameters import naming
 from lupin_twin.ros.services import Services, Twin
@@ -94,13 +93,13 @@ class LayerService:
         """Create the topics, with names relative to the node's namespace.
 
         Raises:
-            ParameterError: a sensor gives no valid topic, or two give the same.
+            ParameterError: a sensor's name is no valid name of a topic.
 
         """
         of = self._twin.parameters
-        for name, sensor in topics_of(of.layers).items():
+        for sensor in dict.fromkeys(of.layers):
             with naming("layers", sensor):
-                publisher = self._publisher(PointCloud2, name, LAYERS)
+                publisher = self._publisher(PointCloud2, LAYERS_BELOW + sensor, LAYERS)
             self._topics.append(_Topic(publisher, sensor))
         for topic, marks, make in (
             (TAGS, tag_marks, tag_markers),

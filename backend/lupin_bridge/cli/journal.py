@@ -35,7 +35,6 @@ from lupin_twin.journal.checking import (
     RunExtent,
     extents,
     find_all_damage,
-    quarantined_beside,
     row_counts,
     sensors_of,
     size_of,
@@ -44,8 +43,6 @@ from lupin_twin.journal.checking import (
 from lupin_twin.journal.paths import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.rebuild import handle_interrupts, vacuum
 from lupin_twin.journal.retention import (
-    RETENTION_BYTES,
-    RETENTION_NS,
     forget,
     pages_of,
     records,
@@ -55,7 +52,6 @@ from lupin_twin.journal.schema import (
     Empty,
     Foreign,
     NotPossible,
-    get_meta,
     is_damage_error,
     open_named,
 )
@@ -243,12 +239,10 @@ def _lines(connection: sqlite3.Connection, path: Path) -> Iterator[tuple[str, st
     found = extents(connection)
     yield "reach", _reach(found)
     yield "hours", f"{rows['hour']:,} of a tag's sensors"
-    yield "retention", _retention(connection)
     hidden = max(0, len(found) - _RUNS_SHOWN)
     shown = f", the last {_RUNS_SHOWN}" if hidden else ""
     yield "runs", f"{len(found):,} of the clock{shown}"
     yield from (("", _run_line(extent)) for extent in found[hidden:])
-    yield from (("quarantined", f"{it}, {_mb(size)}") for it, size in quarantined_beside(path))
     yield from (("forgotten", _forgotten_line(record)) for record in records(connection))
 
 
@@ -260,14 +254,6 @@ def _reach(found: list[RunExtent]) -> str:
     first = min(first_ns or 0 for first_ns, _ in of_wall)
     last = max(last_ns or 0 for _, last_ns in of_wall)
     return f"{iso(first)} to {iso(last)}"
-
-
-def _retention(connection: sqlite3.Connection) -> str:
-    kept_ns = int(get_meta(connection, RETENTION_NS) or 0)
-    if not kept_ns:
-        return "not written yet by its twin"
-    kept_bytes = int(get_meta(connection, RETENTION_BYTES) or 0)
-    return f"{kept_ns / 86_400e9:g} days and {_mb(kept_bytes)} at most; hours for good"
 
 
 def _run_line(extent: RunExtent) -> str:

@@ -163,16 +163,6 @@ def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
     return rows
 
 
-def quarantined_beside(path: Path) -> list[tuple[str, int]]:
-    """(name, bytes) of the damaged journals that were quarantined, the latest last."""
-    prefix = f"{path.name}.damaged-"
-    return [
-        (file.name, size_of(file))
-        for file in sorted(path.parent.iterdir())
-        if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
-    ]
-
-
 def tags_of(connection: sqlite3.Connection) -> list[str]:
     """The ids of all tags that were observed."""
     return [tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM series ORDER BY tag")]

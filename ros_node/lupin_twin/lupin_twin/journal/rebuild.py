@@ -24,7 +24,6 @@ from lupin_twin.journal.checking import Progress, find_all_damage, size_of
 from lupin_twin.journal.counts import ADD_HOUR, DELETED
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.paths import writing_alone
-from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
 from lupin_twin.journal.runs import Run, put_run, runs
 from lupin_twin.journal.salvage import delete, numbered
 from lupin_twin.journal.schema import (
@@ -56,7 +55,7 @@ _MADE_FROM: Final = "upgraded_from"
 _COPIED: Final = "upgraded"
 # Between two calls while a long SQL statement runs.
 _INSTRUCTIONS: Final = 100_000
-_NUMBERS: Final = (RETENTION_NS, RETENTION_BYTES, "simulated_from_ns", "simulated_until_ns")
+_NUMBERS: Final = ("simulated_from_ns", "simulated_until_ns")
 
 
 def old_version(path: Path) -> int | None:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -86,7 +86,6 @@ class LayerService:
         self._twin, self._services = twin, services
         self._workers = Workers("layers", large_threads=1, small_threads=0)
         self._topics: list[_Topic] = []
-        self._whole: tuple[object, FieldRequest] | None = None
         self.queue = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
 
     def offer(self) -> None:
@@ -202,13 +201,9 @@ class LayerService:
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The request for a sensor's field; its box, that of all tags, is the same for all."""
         rules = self._twin.rules
-        key = self._twin.store.observation_count, rules
-        if self._whole is None or self._whole[0] != key:
-            places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
-            box = default_box(places, rules.max_distance_m)
-            most = min(rules.max_grid_cells, MAX_POINTS)
-            self._whole = key, default_request(sensor, box, most)
-        return replace(self._whole[1], sensor_type=sensor)
+        places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
+        box = default_box(places, rules.max_distance_m)
+        return default_request(sensor, box, min(rules.max_grid_cells, MAX_POINTS))
 
     def _plan_markers(self, topic: _Topic) -> Query:
         # Markers show ages: whether they have changed is known only when they are made.

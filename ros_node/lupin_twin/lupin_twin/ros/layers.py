@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from array import array
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
@@ -216,7 +216,7 @@ def _marker(
 
 
 class MarkerArrays:
-    """Builds visualization_msgs/MarkerArray of one kind of marks, and caches each one's markers.
+    """Builds visualization_msgs/MarkerArray of one kind of marks, when they have changed.
 
     An array is complete: its first marker deletes all earlier ones, so that nothing outdated stays
     in a viewer, not even from an earlier twin. Belongs to one thread at a time.
@@ -232,17 +232,16 @@ class MarkerArrays:
         self._marks = marks
         self._make = make
         self._frame_id = frame_id
-        self._markers: dict[Hashable, list[Any]] | None = None
-        self._clear = Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)
+        self._before: Sequence[Any] | None = None
 
     def build(self, snapshot: Snapshot) -> bytes | None:
         """The serialised array, or None if it has not changed; lets other threads run meanwhile."""
-        marks, before = self._marks(snapshot), self._markers
-        if before is not None and marks == [*before]:
+        marks = self._marks(snapshot)
+        if marks == self._before:
             return None
-        self._markers = {}
+        self._before = marks
+        header = Header(frame_id=self._frame_id)
+        markers = [Marker(header=header, action=Marker.DELETEALL)]
         for mark in in_turns(marks):
-            known = None if before is None else before.get(mark)
-            self._markers[mark] = known or self._make(mark, self._frame_id)
-        markers = [self._clear, *chain.from_iterable(self._markers.values())]
+            markers += self._make(mark, self._frame_id)
         return bytes(serialize_message(MarkerArray(markers=markers)))

@@ -1,6 +1,6 @@
 """Output of the commands for people, and other helpers that commands share.
 
-The standard streams may be full, or read by nobody. A line that cannot be written ends no
+The standard streams may be closed, full, or read by nobody. A line that cannot be written ends no
 work and changes no exit code: only the files count.
 """
 
@@ -11,12 +11,15 @@ import getpass
 import os
 import sqlite3
 import sys
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any, Final, TextIO, TypeAlias
 
 from lupin_twin.runtime.process import discard_output
+
+_AGAIN_AFTER_S: Final = 0.5
 
 
 def say(text: str) -> None:
@@ -29,6 +32,31 @@ def tell(*lines: str) -> None:
     error = _written(sys.stdout, "".join(f"{line}\n" for line in lines))
     if error is not None and not isinstance(error, BrokenPipeError):  # `| head`: it has enough
         say(f"cannot write to the standard output: {getattr(error, 'strerror', error)}")
+
+
+class Progress:
+    """Progress on the standard error: on a terminal, one line that is overwritten."""
+
+    def __init__(self) -> None:
+        self._is_seen = sys.stderr.isatty()
+        self._what = ""
+        self._reported_s = 0.0
+
+    def tell(self, what: str, share: float) -> None:
+        """Show the current step, and the share of it that is done, 0 to 1."""
+        is_new, self._what = what != self._what, what
+        if not self._is_seen:
+            if is_new:
+                _written(sys.stderr, f"{what}\n")
+            return
+        if is_new or time.monotonic() - self._reported_s >= _AGAIN_AFTER_S:
+            self._reported_s = time.monotonic()
+            _written(sys.stderr, f"\r\x1b[K{what} {share:.0%}")
+
+    def clear(self) -> None:
+        """Clear the line, for other output."""
+        if self._is_seen:
+            _written(sys.stderr, "\r\x1b[K")
 
 
 def _written(stream: TextIO | None, text: str) -> Exception | None:
@@ -85,8 +113,10 @@ def user() -> str:
 _PAGES_AT_ONCE: Final = 1000
 
 
-def backup(journal: sqlite3.Connection, target: Path) -> int:
+def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], None]) -> int:
     """Copy a journal to a new file by SQLite's online backup; returns the file's size, bytes.
+
+    `report` gets the copied share, 0 to 1.
 
     Raises:
         CommandError: `target` exists, or cannot be created or written.
@@ -107,7 +137,11 @@ def backup(journal: sqlite3.Connection, target: Path) -> int:
         if_unfinished.callback(target.unlink)
         try:
             with closing(sqlite3.connect(target)) as copy:
-                journal.backup(copy, pages=_PAGES_AT_ONCE)
+                journal.backup(
+                    copy,
+                    pages=_PAGES_AT_ONCE,
+                    progress=lambda _, rest, total: report(1 - rest / max(total, 1)),
+                )
         except sqlite3.Error as error:
             raise CommandError(f"cannot copy to {target}: {error}") from error
         if_unfinished.pop_all()

@@ -21,7 +21,7 @@ from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.cli.journal import SHOWN, add_which, fail, path_of
-from lupin_bridge.console import CommandError, Roles, add_role, say, tell
+from lupin_bridge.console import CommandError, Progress, Roles, add_role, say, tell
 from lupin_bridge.judge.judging import zone_of
 from lupin_twin.adapt.config import place_of, read_yaml
 from lupin_twin.adapt.table import (
@@ -42,6 +42,7 @@ from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 
+_REPORT_EVERY: Final = 20_000
 # Characters of a line; a field of the csv module has 131,072 at most.
 _MAX_LINE: Final = 1_000_000
 # Lines that are named for each reason of refusal, after their count.
@@ -167,8 +168,8 @@ def columns_of(content: Any) -> Columns:
     return columns
 
 
-def lines_of(file: TextIO) -> Iterator[str]:
-    """Yield the lines of a file.
+def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
+    """Yield the lines of a file; reports now and then how many bytes were read.
 
     Raises:
         csv.Error: a line is too long.
@@ -177,6 +178,8 @@ def lines_of(file: TextIO) -> Iterator[str]:
     for number, line in enumerate(iter(partial(file.readline, _MAX_LINE), "")):
         if len(line) == _MAX_LINE:
             raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
+        if number % _REPORT_EVERY == 0:
+            report_every(file.buffer.tell())
         # InfluxDB's annotations
         yield "\n" if line.startswith("#") else line
 
@@ -324,14 +327,17 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 
 def _run(options: argparse.Namespace, path: Path) -> int:
     columns = columns_of(read_yaml(options.columns))
-    summary, new, known = Summary(), 0, 0
+    summary, progress, new, known = Summary(), Progress(), 0, 0
     with options.file.open(encoding="utf-8-sig", newline="") as file:
-        found = scans(lines_of(file), columns, summary)
+        size = options.file.stat().st_size or 1
+        lines = counted(file, lambda at: progress.tell(f"reading {options.file}", at / size))
+        found = scans(lines, columns, summary)
         ordered = in_order(found, summary)
         if options.write:
             new, known = _write(path, columns, ordered)
         else:
             deque(ordered, maxlen=0)
+    progress.clear()
     tell(*summary.lines())
     if not options.write:
         say(f"nothing was written; add --write to import it into {path}")

@@ -154,7 +154,6 @@ def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phon
         show(phone, pane)
         assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     phone.colour_by_value()
-    phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
         show(phone, pane)
         # WCAG 2.2, 2.5.5, as phones recommend; a text link among them is as high.

@@ -222,10 +222,6 @@ describe('permalink', () => {
       camera: { x: -1.25, y: 4.5, span: 6.75 },
       heat: 'error',
       colouring: 'value',
-      ranges: new Map([
-        ['soil_moisture', { low: -3, high: 12.5 }],
-        ['a,b=&c', { low: 400, high: 1200 }],
-      ]),
       layers: new Set(['map', 'field', 'pins']),
       sort: { column: 'soil_moisture', descending: true },
       filter: 'basil & "pest"',
@@ -234,12 +230,6 @@ describe('permalink', () => {
       pane: 'tags',
     };
     expect(fromFragment(`#${toFragment(view)}`)).toEqual(view);
-  });
-
-  test('the range of the sensor in view has the short name', () => {
-    const ranges = new Map([['co2', { low: 1, high: 2 }]]);
-    expect(toFragment({ ...DEFAULT_VIEW, sensor: 'co2', ranges })).toBe('sensor=co2&range=1,2');
-    expect(toFragment({ ...DEFAULT_VIEW, ranges })).toBe('range.co2=1,2');
   });
 
   test.each([
@@ -331,7 +321,6 @@ describe('permalink', () => {
       camera: null,
       heat: 'nearest',
       colouring: 'ideal',
-      ranges: new Map(),
       layers: DEFAULT_LAYERS,
       sort: DEFAULT_VIEW.sort,
       filter: '',

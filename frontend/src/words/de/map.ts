@@ -71,15 +71,6 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'kein Sensor',
   pinFailed: 'Sensor ausgefallen',
   pinPest: 'Schädlinge gefunden',
-  range: 'Farbbereich',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Fest',
-  rangeLow: 'Minimum',
-  rangeHigh: 'Maximum',
-  rangeIdeal: 'Idealbereich übernehmen',
-  rangeNotBelow: (high) => `Muss unter ${high} liegen: nicht übernommen`,
-  rangeNotAbove: (low) => `Muss über ${low} liegen: nicht übernommen`,
-  rangeNoNumber: 'Keine Zahl: nicht übernommen',
   fieldFailed: (reason) =>
     `Die Heatmap konnte nicht geladen werden (${reason}); die Seite versucht es weiter.`,
 

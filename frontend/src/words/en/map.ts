@@ -68,15 +68,6 @@ export const MAP = {
   pinLacking: 'no sensor',
   pinFailed: 'sensor failed',
   pinPest: 'pest seen',
-  range: 'Colour range',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Fixed',
-  rangeLow: 'Lowest',
-  rangeHigh: 'Highest',
-  rangeIdeal: 'Use ideal range',
-  rangeNotBelow: (high: string): string => `Must be below ${high}: not applied`,
-  rangeNotAbove: (low: string): string => `Must be above ${low}: not applied`,
-  rangeNoNumber: 'Not a number: not applied',
   fieldFailed: (reason: string): string =>
     `The heat map could not be loaded (${reason}); the page keeps trying.`,
 

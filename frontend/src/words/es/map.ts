@@ -69,15 +69,6 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'sin sensor',
   pinFailed: 'sensor averiado',
   pinPest: 'plaga detectada',
-  range: 'Escala de colores',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Fija',
-  rangeLow: 'Mínimo',
-  rangeHigh: 'Máximo',
-  rangeIdeal: 'Usar el rango ideal',
-  rangeNotBelow: (high) => `Debe ser inferior a ${high}: no se aplica`,
-  rangeNotAbove: (low) => `Debe ser superior a ${low}: no se aplica`,
-  rangeNoNumber: 'No es un número: no se aplica',
   fieldFailed: (reason) =>
     `No se pudo cargar el mapa de calor (${reason}); la página lo sigue intentando.`,
 

@@ -69,15 +69,6 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'geen sensor',
   pinFailed: 'sensor uitgevallen',
   pinPest: 'plaag gezien',
-  range: 'Kleurbereik',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Vast',
-  rangeLow: 'Laagste',
-  rangeHigh: 'Hoogste',
-  rangeIdeal: 'Ideaal bereik gebruiken',
-  rangeNotBelow: (high) => `Moet onder ${high} liggen: niet toegepast`,
-  rangeNotAbove: (low) => `Moet boven ${low} liggen: niet toegepast`,
-  rangeNoNumber: 'Geen getal: niet toegepast',
   fieldFailed: (reason) =>
     `De heatmap kon niet worden geladen (${reason}); de pagina blijft het proberen.`,
 

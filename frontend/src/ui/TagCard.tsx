@@ -36,7 +36,6 @@ import { Age, AgeFact, Fact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
 import { selectIsCurrent } from './DoNow';
 import { HealthMark } from './HealthMark';
-import { Sparkline } from './Sparkline';
 import { CardEstimate, lazyPart } from './lazyParts';
 import { Reasons } from './Reasons';
 
@@ -121,7 +120,6 @@ function CardBody({
             species={tag.sureSpecies}
             health={health}
             when={tag.readAt.get(name) ?? 'never'}
-            values={history?.sensors.find((each) => each.name === name)?.values ?? []}
           />
         ))}
       </ul>
@@ -198,14 +196,12 @@ function CardReading({
   species,
   health,
   when,
-  values,
 }: {
   name: string;
   value: number | null;
   species: string;
   health: TagHealth | undefined;
   when: When;
-  values: TagHistory['sensors'][number]['values'];
 }): JSX.Element {
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
@@ -225,9 +221,6 @@ function CardReading({
       </strong>
       <span className="card-age faint">
         <Age when={when} />
-      </span>
-      <span className="card-spark">
-        <Sparkline sensor={sensor} values={values} />
       </span>
       {ideal && (
         <span className="card-ideal" data-side={side || undefined} data-health={out?.verdict}>
@@ -278,11 +271,7 @@ const kindOf = (kind: number | null): string => {
 export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {
   if (moment === null) return history;
   const wasMade = ({ stamp }: { readonly stamp: WireTime }): boolean => secondsOf(stamp) <= moment;
-  return {
-    ...history,
-    tries: history.tries.filter(wasMade),
-    sensors: history.sensors.map(({ name, values }) => ({ name, values: values.filter(wasMade) })),
-  };
+  return { ...history, tries: history.tries.filter(wasMade) };
 });
 
 /** Least time between two fetches while a tag is scanned over and over, ms. */

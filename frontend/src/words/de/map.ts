@@ -175,7 +175,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardGoneThen: 'Der Zwilling kannte diesen Messpunkt damals nicht.',
   cardShow: 'Auf der Karte anzeigen',
   cardMore: (count) => `${count} weitere`,
-  cardHistory: (count, from, to) => `Letzte ${count} Messwerte, zwischen ${from} und ${to}`,
   cardSource: 'Quelle',
   cardFixed: 'Fester Sensor',
   cardVisited: 'Vom Roboter gemessen',

@@ -174,8 +174,6 @@ export const TAGS = {
   cardGoneThen: 'The twin did not know this tag then.',
   cardShow: 'Show on map',
   cardMore: (count: number): string => `${count} more`,
-  cardHistory: (count: number, from: string, to: string): string =>
-    `Last ${count} readings, between ${from} and ${to}`,
   cardSource: 'Source',
   cardFixed: 'Fixed sensor',
   cardVisited: 'Visited by the robot',

@@ -173,7 +173,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardGoneThen: 'El gemelo no conocía este punto entonces.',
   cardShow: 'Mostrar en el mapa',
   cardMore: (count) => `${count} más`,
-  cardHistory: (count, from, to) => `Últimas ${count} lecturas, entre ${from} y ${to}`,
   cardSource: 'Origen',
   cardFixed: 'Sensor fijo',
   cardVisited: 'Medido por el robot',

@@ -173,7 +173,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardGoneThen: 'De digital twin kende dit meetpunt toen niet.',
   cardShow: 'Op de kaart tonen',
   cardMore: (count) => `nog ${count}`,
-  cardHistory: (count, from, to) => `Laatste ${count} meetwaarden, tussen ${from} en ${to}`,
   cardSource: 'Bron',
   cardFixed: 'Vaste sensor',
   cardVisited: 'Bezocht door de robot',

@@ -70,17 +70,6 @@ def test_the_map_as_png_equals_the_screen(greenhouse: Bridge, open_page: OpenPag
         assert len(footer.getcolors(1 << 20) or []) > 5
 
 
-def test_copying_the_link_works_or_says_where_it_is(
-    greenhouse: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(greenhouse.url, "sensor=co2", permissions=["clipboard-read", "clipboard-write"])
-    hmi.expect_rows(*TAGS)
-    hmi.page.get_by_role("button", name="Menu").click()
-    hmi.page.get_by_role("button", name="Copy link").click()
-    expect(hmi.page.locator(".toast")).to_have_text("Link copied")
-    assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{greenhouse.url}/#sensor=co2"
-
-
 def luminance(pixel: object) -> float:
     assert isinstance(pixel, tuple)
     return float(sum(pixel) / len(pixel))

@@ -125,18 +125,6 @@ export function viewAddress(parameters: Readonly<Record<string, string>> = {}): 
   return url.href;
 }
 
-/** Copies the view's URL; false if there is no clipboard or it refused. */
-export async function copyLink(): Promise<boolean> {
-  // Only secure contexts have a clipboard, and a greenhouse's plain http is none; the type claims
-  // that it always exists.
-  const clipboard = navigator.clipboard as Clipboard | undefined;
-  if (!clipboard) return false;
-  return clipboard.writeText(viewAddress()).then(
-    () => true,
-    () => false,
-  );
-}
-
 const SHIFT_S = 8 * 3_600;
 /** Longest period that the bridge reports on. */
 const LONGEST_S = 31 * 86_400;

@@ -77,7 +77,7 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     assert frame >= 200
     assert frame + card >= tall
     # The legend leaves its title to the sensor above the map, but not the way out of a comparison.
-    phone.turn("compare=-600")
+    phone.turn("compare=day")
     expect(phone.page.get_by_role("button", name="Stop comparing")).to_be_in_viewport(ratio=1)
     # Both on one line: the comparison takes as little of the map as it can.
 

@@ -215,7 +215,7 @@ describe('permalink', () => {
     const view: Linked = {
       moment: 1_794_000_000.125,
       period: { kind: 'own', from: 1_793_000_000, to: 1_794_100_000.5 },
-      compare: { by: 'ago', seconds: 86_400 },
+      compare: 'day',
       chart: { by: 'sensor', tagIds: ['a,b', '2'] },
       sensor: 'soil_moisture',
       selected: 'tag 7/ä&#',
@@ -242,8 +242,7 @@ describe('permalink', () => {
   });
 
   test.each([
-    ['compare=-604800', { compare: { by: 'ago', seconds: 604_800 } }],
-    ['compare=1794000000.5', { compare: { by: 'moment', at: 1_794_000_000.5 } }],
+    ['compare=week', { compare: 'week' }],
     ['heat=estimate', { heat: 'estimate' }],
     ['chart.tag=5', { chart: { by: 'tag', tagIds: ['5'] } }],
     ['chart.sensor=5&chart.sensor=7', { chart: { by: 'sensor', tagIds: ['5', '7'] } }],

@@ -1,5 +1,5 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
-import type { Compare } from '../domain/difference';
+import { COMPARED, type Compare } from '../domain/difference';
 import { equal, isPossible } from '../domain/twin';
 import { VERDICTS } from '../domain/health';
 import { type Period, PERIOD_KINDS } from '../domain/time';
@@ -30,7 +30,7 @@ export function toFragment(view: Linked): string {
   if (view.moment !== null) parts.set('at', String(view.moment));
   if (view.period.kind === 'own') parts.set('period', `${view.period.from},${view.period.to}`);
   else if (isChosen(view.period)) parts.set('period', view.period.kind);
-  if (view.compare) parts.set('compare', compareText(view.compare));
+  if (view.compare) parts.set('compare', view.compare);
   for (const tagId of view.chart?.tagIds ?? []) parts.append(`chart.${view.chart?.by}`, tagId);
   if (view.sensor !== DEFAULT_VIEW.sensor) parts.set('sensor', view.sensor);
   if (view.selected !== null) parts.set('tag', view.selected);
@@ -88,14 +88,8 @@ function periodOf(text: string | null): Period {
   return { kind: 'own', from, to };
 }
 
-/** Seconds before the shown moment, with a minus; or a moment, ROS seconds. */
-const compareText = (compare: Compare): string =>
-  String(compare.by === 'ago' ? -compare.seconds : compare.at);
-
 function compareOf(text: string | null): Compare | null {
-  const [value] = numbers(text, 1) ?? [];
-  if (value === undefined || Object.is(value, -0)) return null;
-  return value < 0 ? { by: 'ago', seconds: -value } : { by: 'moment', at: roundedMoment(value) };
+  return (Object.keys(COMPARED) as Compare[]).find((each) => each === text) ?? null;
 }
 
 const chartedIn = (parts: URLSearchParams): Charted | null => {

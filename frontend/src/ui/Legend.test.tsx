@@ -51,7 +51,7 @@ describe('legend', () => {
     rerender(<Legend kiosk={false} />);
     expect(at('rmse')).toBe('Typical error 2.7\u00a0°F');
     // It is the map's, not that of a difference.
-    act({ compare: { by: 'ago', seconds: 86_400 } });
+    act({ compare: 'day' });
     rerender(<Legend kiosk={false} />);
     expect(screen.queryByTestId('rmse')).toBeNull();
     act({ compare: null });
@@ -135,7 +135,7 @@ describe('legend', () => {
   });
 
   test('tells of a difference alone while there is one, and has nothing to choose its colours by', () => {
-    act({ compare: { by: 'ago', seconds: 86_400 } });
+    act({ compare: 'day' });
     render(
       <div className="layers">
         <button>Layers</button>

@@ -179,8 +179,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardScanned: 'Letzter Messwert',
   cardInspected: 'Blüten kontrolliert',
   cardLastAttempt: 'Letzter Versuch',
-  cardAttempts: 'Letzte Versuche',
-  cardAttemptKinds: { scan: 'Messung', look: 'Blütenkontrolle', any: 'Versuch' },
   cardArea: 'Bereich',
   cardPosition: 'Position',
 };

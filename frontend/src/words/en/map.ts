@@ -178,8 +178,6 @@ export const TAGS = {
   cardScanned: 'Last reading',
   cardInspected: 'Flowers inspected',
   cardLastAttempt: 'Last attempt',
-  cardAttempts: 'Last attempts',
-  cardAttemptKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
   cardArea: 'Area',
   cardPosition: 'Position',
 } as const;

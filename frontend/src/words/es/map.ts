@@ -177,8 +177,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardScanned: 'Última lectura',
   cardInspected: 'Flores revisadas',
   cardLastAttempt: 'Último intento',
-  cardAttempts: 'Últimos intentos',
-  cardAttemptKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
   cardArea: 'Zona',
   cardPosition: 'Posición',
 };

@@ -177,8 +177,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardScanned: 'Laatste meetwaarde',
   cardInspected: 'Bloemen gecontroleerd',
   cardLastAttempt: 'Laatste poging',
-  cardAttempts: 'Laatste pogingen',
-  cardAttemptKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
   cardArea: 'Afdeling',
   cardPosition: 'Positie',
 };

@@ -138,16 +138,11 @@ function Quality({
   quality: FieldQuality;
   sensor: Sensor;
 }): JSX.Element | null {
-  const { rmse, worst } = quality;
+  const { rmse } = quality;
   if (rmse === null) return null;
-  const error = (value: number): string =>
-    withUnit(sensor, differenceNumber(sensor, Math.abs(value)));
-  const atWorst = worst
-    ? ` ${S.legendErrorWorst(shown(worst.tag_id, 24), error(worst.error))}`
-    : '';
   return (
-    <span title={S.legendErrorHint + atWorst} data-testid="rmse">
-      {S.legendError(error(rmse))}
+    <span title={S.legendErrorHint} data-testid="rmse">
+      {S.legendError(withUnit(sensor, differenceNumber(sensor, Math.abs(rmse))))}
     </span>
   );
 }

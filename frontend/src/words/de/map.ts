@@ -49,7 +49,6 @@ export const MAP: In<typeof EN.MAP> = {
   legendError: (error) => `Typische Abweichung ${error}`,
   legendErrorHint:
     'Typische Abweichung zwischen den Messpunkten: Jeder Messpunkt wird aus allen anderen geschätzt und mit seinem Messwert verglichen.',
-  legendErrorWorst: (tag, error) => `Am größten an Messpunkt ${tag}: ${error}.`,
   legendTransparent: 'Kräftigere Farbe: höherer Wert. Ohne Farbe: kleinster Wert.',
   legendMore: 'Details',
   legendHatched: 'Schraffiert: keine Daten',

@@ -44,7 +44,6 @@ export const MAP = {
   legendError: (error: string): string => `Typical error ${error}`,
   legendErrorHint:
     'Typical error between tags: each tag is estimated from all the others and compared with its own reading.',
-  legendErrorWorst: (tag: string, error: string): string => `Worst at tag ${tag}: ${error}.`,
   legendTransparent: 'Stronger colour: higher value. No colour: minimum.',
   legendMore: 'Details',
   legendHatched: 'Hatched: no data',

@@ -47,7 +47,6 @@ export const MAP: In<typeof EN.MAP> = {
   legendError: (error) => `Error habitual ${error}`,
   legendErrorHint:
     'Error habitual entre los puntos: cada punto se estima a partir de los demás y se compara con su propia lectura.',
-  legendErrorWorst: (tag, error) => `El mayor, en el punto ${tag}: ${error}.`,
   legendTransparent: 'Color más intenso: valor más alto. Sin color: el mínimo.',
   legendMore: 'Detalles',
   legendHatched: 'Rayado: sin datos',

@@ -47,7 +47,6 @@ export const MAP: In<typeof EN.MAP> = {
   legendError: (error) => `Typische afwijking ${error}`,
   legendErrorHint:
     'Typische afwijking tussen de meetpunten: elk meetpunt wordt uit alle andere geschat en vergeleken met de eigen meetwaarde.',
-  legendErrorWorst: (tag, error) => `Grootste afwijking bij meetpunt ${tag}: ${error}.`,
   legendTransparent: 'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde.',
   legendMore: 'Details',
   legendHatched: 'Gearceerd: geen gegevens',

@@ -155,7 +155,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   unclassified: 'nicht bestimmt',
   tableButton: 'Spalten und Zeilen',
   tableColumns: 'Spalten',
-  columnNoRoom: 'Fenster zu schmal',
   tableByArea: 'Nach Bereich gruppieren',
   areaNone: 'Kein Bereich',
   trend: 'Tendenz',

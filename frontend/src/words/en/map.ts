@@ -153,7 +153,6 @@ export const TAGS = {
   unclassified: 'not classified',
   tableButton: 'Columns and rows',
   tableColumns: 'Columns',
-  columnNoRoom: 'window too narrow',
   tableByArea: 'Group by area',
   areaNone: 'No area',
   trend: 'Trend',

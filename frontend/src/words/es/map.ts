@@ -153,7 +153,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   unclassified: 'sin clasificar',
   tableButton: 'Columnas y filas',
   tableColumns: 'Columnas',
-  columnNoRoom: 'ventana demasiado estrecha',
   tableByArea: 'Agrupar por zona',
   areaNone: 'Sin zona',
   trend: 'Tendencia',

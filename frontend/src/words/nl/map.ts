@@ -153,7 +153,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   unclassified: 'niet herkend',
   tableButton: 'Kolommen en rijen',
   tableColumns: 'Kolommen',
-  columnNoRoom: 'venster te smal',
   tableByArea: 'Groeperen per afdeling',
   areaNone: 'Geen afdeling',
   trend: 'Trend',

@@ -112,17 +112,17 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'keys.time.3.1', 'themes.system', 'attemptOutcomes.ok', 'sensors'],
     ...['cardPosition', 'saveCsvShort', 'legendMore'],
-    ...['keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
+    ...['keys.global.9.0', 'idealParts.any', 'colourings.ideal'],
   ],
   nl: [
     ...['phase.live', 'keys.time.3.1', 'menu', 'attemptOutcomes.ok', 'sensors', 'alarmCount'],
     ...['saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
-    ...['keys.global.11.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
+    ...['keys.global.9.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
     ...['speciesNames.gerbera', 'phase.offline'],
   ],
   es: [
     ...['robotLayer', 'robotAt', 'attemptOutcomes.ok', 'sensors', 'saveCsvShort'],
-    ...['speciesNames.gerbera', 'keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
+    ...['speciesNames.gerbera', 'keys.global.9.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };
 

@@ -186,8 +186,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['C', 'Verlauf des gewählten Messpunkts'],
       ['L', 'Zurück zu Live'],
       ['Leertaste', 'Rückblick abspielen oder anhalten'],
-      ['U', '°C oder °F'],
-      ['T', 'Hell oder dunkel'],
       ['Esc', 'Schließen, dann zurück zu Live'],
       ['?', 'Diese Liste'],
     ],

@@ -185,8 +185,6 @@ export const PAGE = {
       ['C', 'Charts of the chosen tag'],
       ['L', 'Back to live'],
       ['Space', 'Play or pause the past'],
-      ['U', '°C or °F'],
-      ['T', 'Light or dark'],
       ['Esc', 'Close, then back to live'],
       ['?', 'This list'],
     ],

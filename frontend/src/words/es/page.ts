@@ -181,8 +181,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['C', 'Gráficas del punto elegido'],
       ['L', 'Volver al directo'],
       ['Espacio', 'Reproducir o pausar el histórico'],
-      ['U', '°C o °F'],
-      ['T', 'Claro u oscuro'],
       ['Esc', 'Cerrar; después, volver al directo'],
       ['?', 'Esta lista'],
     ],

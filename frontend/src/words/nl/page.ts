@@ -183,8 +183,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['C', 'Grafieken van het gekozen meetpunt'],
       ['L', 'Terug naar live'],
       ['Spatie', 'Terugblik afspelen of pauzeren'],
-      ['U', '°C of °F'],
-      ['T', 'Licht of donker'],
       ['Esc', 'Sluiten, daarna terug naar live'],
       ['?', 'Deze lijst'],
     ],

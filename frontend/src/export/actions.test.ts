@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { snapshotOf } from '../domain/twin';
-import { act, prefer, receive, store } from '../store/app';
+import { act, prefer, receive } from '../store/app';
 import { withSort } from '../store/view';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
@@ -62,21 +62,6 @@ describe('table as a file', () => {
     // 5 s old when the state was taken.
     expect((await lines())[1]).toMatch(/,5,1970-01-01T00:01:40\.000Z,/);
   });
-
-  test.each(['ready', 'failed'] as const)(
-    'waits in the first moments until the sensors’ own names are %s, and comes once',
-    async (state) => {
-      const { sensors } = store.get().twin;
-      receive({ sensors: { value: null, state: 'waiting', message: '' } });
-      saveTable();
-      act({ filter: '10' });
-      expect(names).toEqual([]);
-      receive({ sensors: { ...sensors, state } });
-      act({ filter: '' });
-      expect(names).toHaveLength(1);
-      expect((await lines())[0]).toContain('Temperature [°C]');
-    },
-  );
 
   test('is sorted as the table is', async () => {
     act(withSort('temperature'));

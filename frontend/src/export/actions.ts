@@ -22,24 +22,8 @@ import { isChosen } from '../store/view';
 import { LANGUAGE, S } from '../strings';
 import { fileName, save, saveCsv } from './save';
 
-/**
- * Saves the table as shown, filtered and sorted; ages are as of the state's time. If called before the
- * sensors' names and units are loaded, it waits for them.
- */
+/** Saves the table as shown, filtered and sorted; ages are as of the state's time. */
 export function saveTable(): void {
-  const isKnown = (): boolean => store.get().twin.sensors.state !== 'waiting';
-  if (isKnown()) {
-    writeTable();
-    return;
-  }
-  const stop = store.subscribe(() => {
-    if (!isKnown()) return;
-    stop();
-    writeTable();
-  });
-}
-
-function writeTable(): void {
   const state = store.get();
   const { snapshot, moment } = selectShown(state);
   if (!snapshot) return;

@@ -142,7 +142,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Drucken',
   kiosk: 'Wandanzeige',
   kioskLeave: 'Beenden',
-  cycleNext: (sensor, time) => `danach: ${sensor} in ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} wird ignoriert: möglich sind ${least} bis ${most} Sekunden.`,
   help: 'Tastenkürzel',

@@ -145,7 +145,6 @@ export const PAGE = {
   print: 'Print',
   kiosk: 'Wall screen',
   kioskLeave: 'Exit',
-  cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
     `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,
   help: 'Keyboard shortcuts',

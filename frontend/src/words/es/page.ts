@@ -139,7 +139,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Imprimir',
   kiosk: 'Pantalla mural',
   kioskLeave: 'Salir',
-  cycleNext: (sensor, time) => `después: ${sensor} en ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} se ignora: use de ${least} a ${most} segundos.`,
   help: 'Atajos de teclado',

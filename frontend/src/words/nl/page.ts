@@ -141,7 +141,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Afdrukken',
   kiosk: 'Wandscherm',
   kioskLeave: 'Verlaten',
-  cycleNext: (sensor, time) => `daarna: ${sensor} over ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} wordt genegeerd: mogelijk is ${least} tot ${most} seconden.`,
   help: 'Sneltoetsen',

@@ -71,12 +71,10 @@ def test_everything_can_be_clicked(open_at: Callable[..., Hmi]) -> None:
         show(hmi, "Map")
         has_tabs = hmi.page.locator(".pane-tabs").is_visible()
         expect(hmi.test_id("health-strip")).to_be_visible(visible=has_tabs)
-        for mode in ("Ideal", "Value", "Fixed"):
+        for mode in ("Ideal", "Value"):
             hmi.open_details()
             hmi.page.get_by_role("radio", name=mode).check()
             hmi.open_details(False)
-            if mode == "Value":
-                continue  # "Fixed" has everything that it has
             # Lower than this, a greenhouse of ten metres is the size of a stamp.
             least = 120 if size in LOW else 200
             tall = "([map, least]) => map.clientHeight >= least"
@@ -177,7 +175,7 @@ def test_an_upright_window_has_the_map_or_the_table_and_a_card_below_the_map(
         assert frame.top + 200 <= frame.bottom <= card.top < card.bottom <= tabs.top
 
 
-def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
+def test_a_phone_has_room_for_the_facts_and_missing_data(
     open_at: Callable[..., Hmi],
 ) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]))
@@ -190,7 +188,6 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
     # Over the map, whose height stays.
     assert place(facts).bottom <= place(legend).top
     hmi.turn("sensor=soil_moisture&colour=value")
-    hmi.page.get_by_role("radio", name="Fixed").check()
     hmi.turn("sensor=radiation")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
     notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")

@@ -34,24 +34,6 @@ def save(hmi: Hmi, name: str) -> Download:
 FOOTER_PX = 56
 
 
-def is_red(pixel: object) -> bool:
-    assert isinstance(pixel, tuple)
-    red, green, blue = pixel
-    return bool(red > green + 30 and red > blue + 30)
-
-
-def longest_dark_run(picture: Image.Image) -> int:
-    """The longest horizontal line of dark pixels in the right half, pixels."""
-    dark = picture.convert("L").point(lambda value: 255 if value < 90 else 0)
-    longest = 0
-    for y in range(dark.height):
-        run = 0
-        for x in range(dark.width // 2, dark.width):
-            run = run + 1 if dark.getpixel((x, y)) else 0
-            longest = max(longest, run)
-    return longest
-
-
 def is_on_the_screen(hmi: Hmi, part: Image.Image, at: tuple[int, int], ratio: int) -> bool:
     """Whether that part of the map is there, `at` in pixels of the map view."""
     box = hmi.map.bounding_box()
@@ -84,23 +66,8 @@ def test_the_map_as_png_equals_the_screen(greenhouse: Bridge, open_page: OpenPag
         hmi.expect(partial(is_on_the_screen, hmi, saved, (x0, y0), ratio), "what was saved")
         assert len(saved.getcolors(1 << 20) or []) > 50
         footer = picture.crop((0, picture.height - FOOTER_PX * ratio, *picture.size))
-        # The ramp's upper half ends in temperature's full red, a legend of values above.
-        reds = [rgb for _, rgb in footer.getcolors(1 << 20) or [] if is_red(rgb)]
-        assert len(reds) > 20
-        # The scale bar, of a round length.
-        length = longest_dark_run(footer) / ratio / view.scale
-        assert min(abs(length - metres) for metres in (0.5, 1, 2)) < 3 / view.scale
-
-
-def test_copying_the_link_works_or_says_where_it_is(
-    greenhouse: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(greenhouse.url, "sensor=co2", permissions=["clipboard-read", "clipboard-write"])
-    hmi.expect_rows(*TAGS)
-    hmi.page.get_by_role("button", name="Menu").click()
-    hmi.page.get_by_role("button", name="Copy link").click()
-    expect(hmi.page.locator(".toast")).to_have_text("Link copied")
-    assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{greenhouse.url}/#sensor=co2"
+        # Its words: what the colours show, and of when.
+        assert len(footer.getcolors(1 << 20) or []) > 5
 
 
 def luminance(pixel: object) -> float:

@@ -77,7 +77,7 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     assert frame >= 200
     assert frame + card >= tall
     # The legend leaves its title to the sensor above the map, but not the way out of a comparison.
-    phone.turn("compare=-600")
+    phone.turn("compare=day")
     expect(phone.page.get_by_role("button", name="Stop comparing")).to_be_in_viewport(ratio=1)
     # Both on one line: the comparison takes as little of the map as it can.
 
@@ -154,7 +154,6 @@ def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phon
         show(phone, pane)
         assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     phone.colour_by_value()
-    phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
         show(phone, pane)
         # WCAG 2.2, 2.5.5, as phones recommend; a text link among them is as high.

@@ -112,9 +112,6 @@ describe('legend', () => {
       '9 of 10 scans within the predicted range',
     );
     expect(text('estimate-key')).toContain(`Hatched colour: less certain than ±1.6${NBSP}°C`);
-    expect(text('legend')).toContain(
-      'Last day: 412 of 458 scans, last week: 2,900 of 3,200 scans.',
-    );
     expect(text('legend')).toContain('90 % interval');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();
   });

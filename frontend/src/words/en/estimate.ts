@@ -18,10 +18,6 @@ export const ESTIMATE = {
   predicted: (inside: number, scans: number): string =>
     `${whole(inside)} of ${counted(scans, 'scan', 'scans')} within the predicted range`,
   predictedNone: 'No scan has been compared with it yet',
-  predictedDay: (inside: number, scans: number): string =>
-    `Last day: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
-  predictedWeek: (inside: number, scans: number): string =>
-    `last week: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
   fitProblem: (reason: string): string => `The model does not fit this greenhouse well: ${reason}`,
   notTrusted: (count: number): string =>
     `Error range is too narrow: only ${count} of 10 scans were within it, not 9.`,

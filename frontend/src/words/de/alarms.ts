@@ -130,8 +130,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    heldUntil: (status, isBelow, until) =>
-      until === null ? `noch ${status}` : `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
+    must: {
+      below: (limit) => `muss über ${limit} steigen`,
+      above: (limit) => `muss unter ${limit} sinken`,
+    },
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,
@@ -230,6 +232,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
   side: { below: 'tief', above: 'hoch' },
-  below: 'unter Ideal',
-  above: 'über Ideal',
+  below: 'zu niedrig',
+  above: 'zu hoch',
 };

@@ -86,8 +86,8 @@ export function More({
   english = '',
 }: {
   label: string;
-  text?: string;
-  english?: string;
+  text?: string | undefined;
+  english?: string | undefined;
 }): JSX.Element | null {
   if (text === '' && english === '') return null;
   return (

@@ -137,7 +137,7 @@ export function sharedJudgement(before: Judgement | null, now: Judgement): Judge
 /** Longest name of an undeclared sensor or kind, characters. */
 const LONGEST_NAME = 32;
 /** A longer name gives way to its abbreviation, if it has one. */
-const LONG_NAME = 20;
+const LONG_NAME = 19;
 
 /** A sensor's name in sentences and headings. */
 export const nameOf = ({ label }: Sensor): string =>

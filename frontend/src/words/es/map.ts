@@ -7,7 +7,7 @@ const SHORT = new Map([
   ['Temperatura', 'Temp.'],
   ['Humedad relativa (HR)', 'HR'],
   ['Humedad del sustrato', 'Sustrato'],
-  ['Déficit de presión de vapor (DPV)', 'DPV'],
+  ['Déficit de vapor (DPV)', 'DPV'],
   ['Punto de rocío', 'P. de rocío'],
 ]);
 

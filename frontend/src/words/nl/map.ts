@@ -5,7 +5,7 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperatuur', 'Temp.'],
-  ['Relatieve vochtigheid (RV)', 'RV'],
+  ['Luchtvochtigheid (RV)', 'RV'],
   ['Bodemvocht', 'Bodem'],
   ['Dampdrukdeficit (VPD)', 'VPD'],
 ]);

@@ -254,7 +254,7 @@ export const PAST: In<typeof EN.PAST> = {
     pest: 'gevulde driehoek: plaag gezien',
     cleared: 'lege ring: plaag weg',
     silence: 'gearceerd: geen meetpoging',
-    before: 'tegengesteld gearceerd: niet vastgelegd of niet meer bewaard',
+    before: 'andersom gearceerd: niet vastgelegd of niet meer bewaard',
     run: 'streepjeslijn: klok teruggezet',
   },
   timebarCounts: (scans, failures, seen, cleared) =>

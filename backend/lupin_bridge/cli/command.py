@@ -265,15 +265,16 @@ def parser() -> argparse.ArgumentParser:
         arguments = common.add_argument_group(group)
         for spec in table():
             if spec.metadata["group"] == group:
-                limits = limits_of(spec.name)
+                limits, text = limits_of(spec.name), spec.metadata["help"]
+                nothing = "empty" if "empty:" in text else "none"
                 arguments.add_argument(
                     option(spec.name),
                     action="append" if spec.default == () else "store",
                     # None: not given here, so the environment or the file decides.
                     default=None,
                     metavar=spec.name.rpartition("_")[2].upper(),
-                    help=f"{spec.metadata['help']}{limits and f'; {limits}'} "
-                    f"(default: {spec.default or 'none'})",
+                    help=f"{text}{limits and f'; {limits}'} "
+                    f"(default: {nothing if spec.default in ('', ()) else spec.default})",
                 )
     for role, text in ROLES.items():
         own = add_role(roles, role, text, parents=[common])
@@ -306,13 +307,13 @@ def parser() -> argparse.ArgumentParser:
                 help="start this long after the first message of the recording; earlier messages "
                 "are published at once (default: 0)",
             )
-            own.add_argument("--loop", action="store_true", help="play it again from its end")
+            own.add_argument("--loop", action="store_true", help="when it ends, play it again")
             own.add_argument(
                 "--skip-gaps",
                 type=_seconds,
                 default=math.inf,
                 metavar="SECONDS",
-                help="skip silences of the recording longer than this (default: wait)",
+                help="skip gaps in the recording longer than this (default: wait)",
             )
     journal.add_parser(roles)
     administration.add_archive(roles)

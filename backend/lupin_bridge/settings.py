@@ -99,7 +99,7 @@ class Settings:
     sensors: str = _setting(
         "",
         "JSON file with every sensor's label, unit, colour and ranges; empty: the built-in one",
-        group="judgement",
+        group="status",
     )
     reading_validity_s: Annotated[float, Interval(ge=0.0, le=604_800.0)] = _setting(
         0.0, "how long a reading is valid, s; 0: three times the tag's usual scan interval"
@@ -154,7 +154,7 @@ class Settings:
     journal: str = _setting(
         "",
         "for web: its twin's journal, if this machine sees the file under a different path",
-        group="past",
+        group="history",
     )
     site: str = _setting(
         "",

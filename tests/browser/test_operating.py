@@ -291,7 +291,7 @@ def test_the_page_uses_the_language_of_the_browser_or_the_address_or_the_menu(
     hmi.expect(lambda: hmi.page.evaluate(_BROKEN) == [], "whole words in the heads")
     hmi.page.locator(".menu > button").click()
     hmi.test_id("language").select_option(label="Nederlands")
-    expect(hmi.test_id("legend")).to_contain_text("Luchtvochtigheid")
+    expect(hmi.test_id("legend")).to_contain_text("Luchtvochtigheid (RV)")
     expect(hmi.card("1")).to_contain_text("Meetpunt 1")
     hmi.expect(lambda: hmi.page.evaluate(_BROKEN) == [], "whole words in the heads")
     stored = {"sensor": ["humidity"], "tag": ["1"]}

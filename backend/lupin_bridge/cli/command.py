@@ -245,15 +245,16 @@ def parser() -> argparse.ArgumentParser:
         arguments = common.add_argument_group(group)
         for spec in table():
             if spec.metadata["group"] == group:
-                limits = limits_of(spec.name)
+                limits, text = limits_of(spec.name), spec.metadata["help"]
+                nothing = "empty" if "empty:" in text else "none"
                 arguments.add_argument(
                     option(spec.name),
                     action="append" if spec.default == () else "store",
                     # None: not given here, so the environment or the file decides.
                     default=None,
                     metavar=spec.name.rpartition("_")[2].upper(),
-                    help=f"{spec.metadata['help']}{limits and f'; {limits}'} "
-                    f"(default: {spec.default or 'none'})",
+                    help=f"{text}{limits and f'; {limits}'} "
+                    f"(default: {nothing if spec.default in ('', ()) else spec.default})",
                 )
     for role, text in ROLES.items():
         own = add_role(roles, role, text, parents=[common])
@@ -274,7 +275,7 @@ def parser() -> argparse.ArgumentParser:
                 "--from",
                 dest="recording",
                 metavar="FILE.mcap",
-                help="play this recording instead of the patrol: a file, or the folder of its "
+                help="play this recording instead of the patrol: one file, or the folder of its "
                 "files. It feeds a twin of its own, with the time of the recording and a temporary "
                 "journal",
             )

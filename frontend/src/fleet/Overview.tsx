@@ -14,6 +14,7 @@ import {
 
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
+import { More } from '../widgets/controls';
 import type { CauseText } from './Causes';
 import { Choice } from './Choice';
 import type { Seen } from './follow';
@@ -178,7 +179,7 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
   return (
     <div role="alert" className="fleet-trouble" hidden={!text}>
       {text && <strong>{text}</strong>}
-      {detail && <span lang="en">{detail}</span>}
+      <More label={S.more} english={detail} />
     </div>
   );
 }

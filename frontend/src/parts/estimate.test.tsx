@@ -79,7 +79,7 @@ describe('readout', () => {
     point(0.5);
     // Until its clock starts, a part that is loaded late counts from the last tick before it.
     await waitFor(() => {
-      expect(text('readout-near')).toBe(`1 tag near, oldest reading 12${NBSP}min`);
+      expect(text('readout-near')).toBe(`1 tag nearby, oldest reading 12${NBSP}min ago`);
     });
     expect(text('readout')).toContain(`22.4${NBSP}±${NBSP}1.3${NBSP}°C`);
     point(1.5);

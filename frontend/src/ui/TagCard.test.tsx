@@ -147,7 +147,7 @@ describe('card', () => {
         <TagTable />
       </>,
     );
-    expect(screen.getAllByText(/stressed until above 18\.5/).length).toBeGreaterThan(0);
+    expect(screen.getAllByText(/must rise above 18\.5/).length).toBeGreaterThan(0);
     const ideal = document.querySelector<HTMLElement>('.card-ideal');
     expect(ideal?.textContent).toMatch(/^daytime ideal/);
     expect(ideal?.dataset['health']).toBeUndefined();

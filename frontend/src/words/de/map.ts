@@ -159,7 +159,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   areaNone: 'Kein Bereich',
   trend: 'Tendenz',
   trendTitle: (sensor, hour) =>
-    `${sensor}: Änderung seit einer ${hour ? `Gewächshausstunde (${hour})` : 'Stunde'}`,
+    `${sensor}, Änderung seit einer ${hour ? `Gewächshausstunde (${hour})` : 'Stunde'}`,
   trendNone: 'vor einer Stunde kein Messwert',
   trendSame: 'kein neuer Wert',
   trendLevel: 'stabil',

@@ -68,12 +68,11 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Eine Nachricht vom Server war nicht lesbar und wurde verworfen.'
       : `${count} Nachrichten vom Server waren nicht lesbar und wurden verworfen.`,
-  unreadLast: (why) => `Zuletzt: ${why}`,
   paused: 'Die Zeit ist angehalten.',
   pausedHint: 'Simulation oder Aufzeichnung sind angehalten; die Messwerte altern nicht.',
   mixture:
     'Mehr als ein Zwilling sendet. Die Seite zeigt ein Gemisch: Bitte alle bis auf einen beenden.',
-  inputProblem: 'Nicht alle Daten kommen hier an.',
+  inputProblem: 'Ein Teil der Daten kommt nicht an.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
   journal: {

@@ -4,7 +4,7 @@ import { counted, whole } from './counted';
 export const ESTIMATE = {
   about: 'What ± means',
   aboutText:
-    'Nine of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
+    'Nine out of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
     'depends on the distance and age of the readings, and on the time of day. The longer nothing ' +
     'is measured, the larger the ±.',
   onItsWay: 'Loading the estimate',
@@ -22,8 +22,8 @@ export const ESTIMATE = {
   notTrusted: (count: number): string =>
     `Error range is too narrow: only ${count} of 10 scans were within it, not 9.`,
   near: (count: number): string =>
-    count === 0 ? 'no tag near' : counted(count, 'tag near', 'tags near'),
-  oldest: (age: string): string => `oldest reading ${age}`,
+    count === 0 ? 'no tag nearby' : counted(count, 'tag nearby', 'tags nearby'),
+  oldest: (age: string): string => `oldest reading ${age} ago`,
   expected: (measured: string, expected: string): string =>
     `measured ${measured}, expected ${expected}`,
   leftOut: (sensor: string): string => `${sensor}: possible sensor fault, not used in the estimate`,

@@ -3,7 +3,6 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperature', 'Temp.'],
-  ['Humidity', 'RH'],
   ['Soil moisture', 'Soil'],
   ['Vapour pressure deficit', 'VPD'],
 ]);

@@ -5,9 +5,9 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperatura', 'Temp.'],
-  ['Humedad relativa', 'HR'],
+  ['Humedad relativa (HR)', 'HR'],
   ['Humedad del sustrato', 'Sustrato'],
-  ['Déficit de presión de vapor', 'DPV'],
+  ['Déficit de vapor (DPV)', 'DPV'],
   ['Punto de rocío', 'P. de rocío'],
 ]);
 
@@ -116,7 +116,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   },
   pest: 'Plaga',
   pestCount: (count) => counted(count, 'individuo', 'individuos'),
-  notOnMap: 'Sin lugar',
+  notOnMap: 'Sin posición',
   notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
   farOff: 'Demasiado lejos, fuera del mapa',
   farOffLong: (place) =>

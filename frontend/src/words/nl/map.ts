@@ -5,9 +5,9 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperatuur', 'Temp.'],
-  ['Luchtvochtigheid', 'RV'],
+  ['Luchtvochtigheid (RV)', 'RV'],
   ['Bodemvocht', 'Bodem'],
-  ['Dampdrukdeficit', 'VPD'],
+  ['Dampdrukdeficit (VPD)', 'VPD'],
 ]);
 
 export const MAP: In<typeof EN.MAP> = {
@@ -159,7 +159,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendTitle: (sensor, hour) =>
     `${sensor} vergeleken met een ${hour ? `kasuur (${hour})` : 'uur'} geleden`,
   trendNone: 'een uur geleden geen meting',
-  trendSame: 'niets nieuws',
+  trendSame: 'geen nieuwe waarde',
   trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: onbekend',
 

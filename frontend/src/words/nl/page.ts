@@ -68,11 +68,10 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Een bericht van de server was onleesbaar en is genegeerd.'
       : `${count} berichten van de server waren onleesbaar en zijn genegeerd.`,
-  unreadLast: (why) => `Laatste: ${why}`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of opname is gepauzeerd; de meetwaarden worden niet ouder.',
   mixture: 'Er zendt meer dan één digital twin. De pagina toont een mengsel: stop alle op één na.',
-  inputProblem: 'Niet alle gegevens komen hier aan.',
+  inputProblem: 'Een deel van de gegevens komt niet aan.',
   drops: (count) =>
     `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} niet verwerkt.`,
   journal: {
@@ -249,7 +248,7 @@ export const PAST: In<typeof EN.PAST> = {
     pest: 'gevulde driehoek: plaag gezien',
     cleared: 'lege ring: plaag weg',
     silence: 'gearceerd: geen meetpoging',
-    before: 'tegengesteld gearceerd: niet vastgelegd of niet meer bewaard',
+    before: 'andersom gearceerd: niet vastgelegd of niet meer bewaard',
     run: 'streepjeslijn: klok teruggezet',
   },
   timebarCounts: (scans, failures, seen, cleared) =>

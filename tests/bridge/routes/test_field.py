@@ -128,7 +128,6 @@ def test_the_headers_of_every_format_describe_its_content(live: Bridge, suffix: 
         "x-field-value-min": str(np.float32(min(values))),
         "x-field-value-max": str(np.float32(max(values))),
         "x-field-sample-count": "3",
-        "x-field-far-off-count": "0",
     }
     assert headers["content-disposition"] == f'inline; filename="temperature.{suffix}"'
     assert headers["cache-control"] == "no-cache"

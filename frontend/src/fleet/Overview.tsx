@@ -14,7 +14,6 @@ import {
 
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
-import { More } from '../widgets/controls';
 import type { CauseText } from './Causes';
 import { Choice } from './Choice';
 import type { Seen } from './follow';
@@ -179,7 +178,12 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
   return (
     <div role="alert" className="fleet-trouble" hidden={!text}>
       {text && <strong>{text}</strong>}
-      <More label={S.more} english={detail} />
+      {detail && (
+        <details>
+          <summary>{S.more}</summary>
+          <span lang="en">{detail}</span>
+        </details>
+      )}
     </div>
   );
 }

@@ -219,6 +219,7 @@ describe.each([
 
   test('shortens no name that a site has given a sensor', () => {
     for (const own of ['Leaf temperature', 'constructor']) expect(words.sensorShort(own)).toBe(own);
+    expect(ENGLISH.sensorShort('Humidity'), 'one name in chips and reasons').toBe('Humidity');
   });
 
   test('comes when it is asked for, and asks the page for nothing', async () => {

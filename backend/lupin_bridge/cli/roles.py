@@ -26,7 +26,7 @@ from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies, exposure
 from lupin_bridge.app import create_app, has_page
 from lupin_bridge.archive import forwarding as archive
-from lupin_bridge.archive.database import ArchiveError, check_url, open_archive
+from lupin_bridge.archive.database import check_url
 from lupin_bridge.bags.recording import INPUTS, Recording, RecordingError
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource, ailment
@@ -399,7 +399,6 @@ async def _run_fleet(
     from lupin_bridge.fleet.app import Fleet, create_fleet_app  # noqa: PLC0415  # not for a twin
 
     listener = _open_listener(settings, access)
-    await asyncio.to_thread(_report_error, settings.archive_url)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # For the processes that read; not on their command line, which others can read.
     os.environ[variable("archive_url")] = settings.archive_url
@@ -414,12 +413,3 @@ async def _run_fleet(
         await serve(server, listener, settings, supervisor, lambda: None)
     finally:
         await fleet.stop()
-
-
-def _report_error(url: str) -> None:
-    """Log at once if the archive cannot be read; that may pass, so the page is served anyway."""
-    try:
-        with closing(open_archive(url)):
-            pass
-    except ArchiveError as error:
-        log.error("%s; it will be retried", error)  # noqa: TRY400  # one line

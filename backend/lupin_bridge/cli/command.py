@@ -9,6 +9,7 @@ import argparse
 import json
 import logging
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -43,9 +44,15 @@ from lupin_twin.runtime.process import (
     split_ros_args,
 )
 
-# How many messages of a level one logger may write at once, and the period of each further one.
-AT_ONCE: Final = 50
-PERIOD_S: Final = 1.0
+# How often a message may repeat at once, and the period of each further one.
+AT_ONCE: Final = 20
+PERIOD_S: Final = 5.0
+# The same limits for all messages of one logger.
+LOGGER_AT_ONCE: Final = 200
+LOGGER_PERIOD_S: Final = 0.2
+MAX_KINDS: Final = 1_000
+
+_NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
 
 # uvicorn's message, whose trace is of no use: a client sent the bytes.
 _NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
@@ -68,21 +75,27 @@ class JsonFormatter(logging.Formatter):
 
 
 class OnceInAWhile(logging.Filter):
-    """Limits the rate of records of one logger and level.
+    """Limits the rate of records of each kind, and of all records of one logger.
 
-    Any client can cause some of them as often as it likes, which would soon fill a disk.
+    Any client can cause some of them as often as it likes, which would soon fill a disk. A kind is
+    the first line of a message, without its numbers (addresses, sizes, ids).
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._rate = RateLimit(1.0 / PERIOD_S, AT_ONCE)
+        self._kinds = RateLimit(1.0 / PERIOD_S, AT_ONCE, MAX_KINDS)
+        self._loggers = RateLimit(1.0 / LOGGER_PERIOD_S, LOGGER_AT_ONCE, MAX_KINDS)
         self._held_back: Counter[Hashable] = Counter()
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether to write the record; adds to it how many were held back before."""
-        kind = record.name, record.levelno
-        if self._rate.take(kind, time.monotonic()):
-            self._held_back[kind] += 1
+        now_s = time.monotonic()
+        text = record.getMessage() if record.msg == "%s" else str(record.msg)
+        error = record.exc_info[0] if record.exc_info else None
+        kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
+        if self._kinds.take(kind, now_s) or self._loggers.take(record.name, now_s):
+            if len(self._held_back) < MAX_KINDS:
+                self._held_back[kind] += 1
             return False
         held_back = self._held_back.pop(kind, 0)
         if record.msg == _NO_TEXT:

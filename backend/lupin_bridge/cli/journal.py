@@ -18,6 +18,7 @@ from lupin_bridge.bags.recording import SUFFIX
 from lupin_bridge.console import (
     FAILED,
     CommandError,
+    Progress,
     Roles,
     add_actions,
     backup,
@@ -266,11 +267,14 @@ def _forgotten_line(record: Mapping[str, Any]) -> str:
 
 def _check(path: Path) -> int:
     found = 0
+    progress = Progress()
     with closing(_reader(path)) as connection:
-        for wrong in find_all_damage(connection):
+        for wrong in find_all_damage(connection, progress.tell):
             found += 1
             if found <= _MAX_SHOWN:
+                progress.clear()
                 _say(wrong)
+    progress.clear()
     if found > _MAX_SHOWN:
         _say(f"and {found - _MAX_SHOWN:,} more")
     _say(f"{path} is {f'damaged in {found:,} places' if found else 'whole'}")
@@ -320,8 +324,10 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
 
 
 def _backup(path: Path, target: Path) -> int:
+    progress = Progress()
     with closing(_reader(path)) as connection:
-        size = backup(connection, target)
+        size = backup(connection, target, lambda share: progress.tell("copying", share))
+    progress.clear()
     _say(f"{target}: {_mb(size)}, a copy of {path}")
     return 0
 
@@ -348,7 +354,9 @@ def _forget(path: Path, options: argparse.Namespace) -> int:
 
 
 def _vacuum(path: Path) -> int:
-    before, after = vacuum(path, "lupin-twin journal vacuum")
+    progress = Progress()
+    before, after = vacuum(path, "lupin-twin journal vacuum", progress.tell)
+    progress.clear()
     _say(f"{path}: {_mb(before)} before, {_mb(after)} after")
     return 0
 

@@ -204,7 +204,7 @@ def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
 
 def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: Path) -> None:
     forward(archive, journal, scans(0, 50))
-    vacuum(journal, "test")
+    vacuum(journal, "test", lambda what, share: None)
     forward(archive, journal, scans(50, 5))
     assert archive.rows() == rows_of(journal)
 

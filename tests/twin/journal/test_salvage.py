@@ -3,6 +3,7 @@
 import random
 import shutil
 import sqlite3
+from collections.abc import Iterator
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -54,7 +55,7 @@ def salvaged(damaged: Path) -> Path:
         salvage(damaged, connection)
     assert is_whole(new)
     with closing(open_reader(new)) as connection:
-        assert list(find_all_damage(connection)) == []
+        assert list(find_all_damage(connection, lambda what, share: None)) == []
     return new
 
 
@@ -228,7 +229,7 @@ def path(tmp_path: Path) -> Path:
 
 def damage(path: Path) -> list[str]:
     with closing(open_reader(path)) as connection:
-        return list(find_all_damage(connection))
+        return list(find_all_damage(connection, lambda what, share: None))
 
 
 def changed(path: Path, sql: str) -> None:
@@ -240,11 +241,16 @@ def test_a_sound_file_passes(path: Path) -> None:
     assert damage(path) == []
 
 
-def test_an_interruption_is_no_damage(path: Path) -> None:
+@pytest.mark.parametrize("where", ["structure", "scan"])
+def test_an_interruption_is_no_damage(where: str, path: Path) -> None:
     with closing(open_reader(path)) as connection:
-        connection.set_progress_handler(lambda: 1, 1)
+
+        def report(what: str, share: float) -> None:
+            if what == where:
+                connection.set_progress_handler(lambda: 1, 1)
+
         with pytest.raises(sqlite3.OperationalError, match="interrupted"):
-            list(find_all_damage(connection))
+            list(find_all_damage(connection, report))
 
 
 @pytest.mark.parametrize(
@@ -270,9 +276,22 @@ def test_damage_is_reported_by_row(path: Path, sql: str, message: str) -> None:
     assert any(found.startswith(message) for found in damage(path))
 
 
-def test_all_damage_is_found(path: Path) -> None:
+def test_all_damage_is_found_and_progress_is_reported(path: Path) -> None:
     changed(path, "UPDATE scan SET readings = '[]' WHERE seq % 2")
-    assert len([wrong for wrong in damage(path) if wrong.startswith("scan")]) == 150
+    reported: list[tuple[str, float]] = []
+
+    def found() -> Iterator[str]:
+        with closing(open_reader(path)) as connection:
+            yield from find_all_damage(
+                connection, lambda what, share: reported.append((what, share))
+            )
+
+    assert len([wrong for wrong in found() if wrong.startswith("scan")]) == 150
+    order = ["structure", "scan", "look", "place"]
+    assert list(dict.fromkeys(what for what, _ in reported)) == order
+    assert {what: share for what, share in reported if what != "structure"} == dict.fromkeys(
+        order[1:], 1.0
+    )
 
 
 @pytest.mark.parametrize("text", ["[1,", "[1],[2]", "7", '["x",1]', "", "[[1]]"])

@@ -8,7 +8,7 @@ checks that rows are valid. SQLite keeps no checksums, so a flipped digit is not
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Final
@@ -57,6 +57,8 @@ _WRONG: Final = {
     ),
 }
 
+Progress = Callable[[str, float], None]
+
 
 def find_damage(path: Path) -> str | None:
     """Return the first defect of the file's structure, None if there is none.
@@ -73,17 +75,19 @@ def find_damage(path: Path) -> str | None:
     return None if found == "ok" else str(found)
 
 
-def find_all_damage(connection: sqlite3.Connection) -> Generator[str, None, None]:
+def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generator[str, None, None]:
     """Yield every defect of a journal, a sentence each.
 
-    A page that cannot be read ends the check of its table, and is reported once.
+    `report(what, share)` is called as the work goes on, with the share that is done. A page that
+    cannot be read ends the check of its table, and is reported once.
 
     Raises:
         sqlite3.OperationalError: the check was interrupted; that is no damage.
 
     """
+    report("structure", 0.0)
     parts = [("structure", _structure(connection))]
-    parts += [(table, _rows(connection, table)) for table in _WRONG]
+    parts += [(table, _rows(connection, table, report)) for table in _WRONG]
     for what, found in parts:
         try:
             yield from found
@@ -109,7 +113,8 @@ def _structure(connection: sqlite3.Connection) -> Iterator[str]:
         yield f"run {number} joins run {joins}, which is missing"
 
 
-def _rows(connection: sqlite3.Connection, table: str) -> Iterator[str]:
+def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Iterator[str]:
+    report(table, 0.0)
     sites = connection.execute(f"SELECT site, min(seq), max(seq) FROM {table} GROUP BY site")
     for site, first, last in sites.fetchall():
         after = first - 1
@@ -122,6 +127,8 @@ def _rows(connection: sqlite3.Connection, table: str) -> Iterator[str]:
                 f"SELECT min(seq) FROM {table} WHERE site = :site AND seq > :until", within
             ).fetchone()
             after = last if following is None else following - 1
+            report(table, (after - first + 1) / (last - first + 1))
+    report(table, 1.0)
 
 
 def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: int) -> None:

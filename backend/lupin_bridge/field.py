@@ -143,14 +143,6 @@ def listed(header: str) -> list[str]:
     return [part.partition(";")[0].strip() for part in header.lower().split(",")]
 
 
-def matches(if_none_match: str | None, tag: str) -> bool:
-    """Whether an If-None-Match header names this ETag (RFC 9110, section 13.1.2: weakly)."""
-    if not if_none_match:
-        return False
-    candidates = [part.strip() for part in if_none_match.split(",")]
-    return "*" in candidates or tag in [part.removeprefix("W/") for part in candidates]
-
-
 def headers(metadata: Mapping[str, str], file_name: str, kind: str = "Field") -> dict[str, str]:
     """A field's metadata as `X-Field-…` headers, and a file name to save it under.
 

@@ -2,7 +2,7 @@
 
 Each kind has a dataclass of its parameters, which parses it and describes it to OpenAPI. pydantic
 is imported only to parse: the process that reads the past uses this module without it. Moments are
-exact to the nanosecond.
+exact to the nanosecond. Also reads If-None-Match, the other thing that a query of the past has.
 """
 
 from __future__ import annotations
@@ -98,6 +98,14 @@ def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
 def safe_name(text: str) -> str:
     """A file name: characters that are special to a file system or a shell become underscores."""
     return _UNSAFE_IN_NAME.sub("_", text)
+
+
+def matches(if_none_match: str | None, tag: str) -> bool:
+    """Whether an If-None-Match header names this ETag (RFC 9110, section 13.1.2: weakly)."""
+    if not if_none_match:
+        return False
+    candidates = [part.strip() for part in if_none_match.split(",")]
+    return "*" in candidates or tag in [part.removeprefix("W/") for part in candidates]
 
 
 def _plain(schema: dict[str, Any]) -> dict[str, Any]:

@@ -55,6 +55,12 @@ def test_the_command_and_a_fleet_need_no_ros() -> None:
     assert result.stdout.endswith(b"}\n")
 
 
+def test_the_process_that_reads_the_past_loads_little() -> None:
+    needless = "{'numpy', 'pydantic', 'asyncio'} & set(sys.modules)"
+    script = f"import sys, lupin_bridge.feed.query, lupin_bridge.past.plans; assert not {needless}"
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
 def test_the_copy_for_the_browsers_types_is_up_to_date() -> None:
     copy = Path(__file__).parents[2] / "frontend" / "openapi.json"
     assert copy.read_bytes() == document(), (

@@ -17,12 +17,12 @@ from typing import Any, ClassVar, Final, Protocol
 import orjson
 
 from lupin_bridge.feed.query import LogReader
-from lupin_bridge.field import matches
 from lupin_bridge.judge.day import LIGHT, SINCE_NS, days_of, nights_by_light
 from lupin_bridge.judge.judging import Criteria, judge_once
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Daily, Derived, IsDay, Sensors
 from lupin_bridge.judge.scans import light_turns
 from lupin_bridge.past import bodies
+from lupin_bridge.query_string import matches
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.diagnostics import Condition

@@ -23,10 +23,10 @@ from lupin_bridge.access.credentials import Person
 from lupin_bridge.access.middleware import PERSON_KEY, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
-from lupin_bridge.field import matches
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
 from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, StateQuery, answered
+from lupin_bridge.query_string import matches
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable

@@ -280,11 +280,13 @@ class Part:
         last = min(self.span.end_ns - 1, self._deleted_ns) // HOUR_NS + 1
         return bool(self.ask(f"SELECT 1 {self._table.hours} LIMIT 1", last=last))
 
-    def hourly(self) -> int:
-        """Number of values, by the hourly counts."""
+    def hourly(self, most: int) -> int:
+        """Number of values in whole hours, by their counts; counting ends at `most` or above."""
         if not self._table.hours:
             return 0
-        return int(self.ask(sql.total(self._table.hours))[0][0])
+        (first, last), _ = whole_hours(self.span, self._deleted_ns)
+        total = sql.total(self._table.hours)
+        return int(self.ask(total, first=first, last=last, most=most)[0][0])
 
     def oldest(self) -> list[int]:
         """The first stamp, or the beginning of the first hour where rows were deleted."""
@@ -295,7 +297,10 @@ class Part:
         return [at_ns for at_ns in found if at_ns is not None]
 
     def count(self, most: int) -> int:
-        """Number of values; counting ends at `most`."""
+        """Number of values; counting ends at `most` or above."""
+        # An hour has at least one, and takes less time than its rows.
+        if (found := self.hourly(most)) >= most:
+            return found
         return int(self.ask(sql.count(self._table.rows), most=most)[0][0])
 
     def entries(self, span: Span | None = None) -> list[Entry]:
@@ -310,14 +315,14 @@ class Part:
         steps, rest = buckets.grid, [self.span]
         if self._table.hours and steps.bucket_ns >= HOUR_NS:
             hours, rest = whole_hours(self.span, self._deleted_ns)
-            for index, count, *numbers in self.ask(
+            for row in self.ask(
                 sql.buckets(self._table.hours),
                 first=hours[0],
                 last=hours[1],
                 origin=steps.start_ns // HOUR_NS,
                 width=steps.bucket_ns // HOUR_NS,
             ):
-                buckets.add(index, int(count), *map(float, numbers))
+                buckets.add(*row)
         for span in rest:
             for stamp_ns, _, value in self.entries(span):
                 if is_counted(value):
@@ -337,7 +342,7 @@ def answer(
         return individually(singly, start_ns, end_ns)
     steps = grid(start_ns, end_ns, max_points)
     if steps.bucket_ns < HOUR_NS and (
-        are_deleted or sum(part.hourly() for part in parts) > MAX_ROWS
+        are_deleted or sum(part.hourly(MAX_ROWS + 1) for part in parts) > MAX_ROWS
     ):
         steps = grid(start_ns, end_ns, max_points, HOUR_NS)
     buckets = Buckets(steps)
@@ -352,14 +357,15 @@ class Buckets:
 
     def __init__(self, steps: Grid) -> None:
         self.grid = steps
-        self._found: dict[int, list[float]] = {}
+        self._found: dict[int, tuple[int, float, float, float]] = {}
 
     def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
         """Add several values to a bucket."""
-        bucket = self._found.setdefault(index, [0, 0.0, low, high])
-        bucket[0] += n
-        bucket[1] += total
-        bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)
+        known = self._found.get(index)
+        if known is not None:
+            n, total = known[0] + n, known[1] + total
+            low, high = min(known[2], low), max(known[3], high)
+        self._found[index] = n, total, low, high
 
     def add_value(self, stamp_ns: int, value: float) -> None:
         """Add one value."""
@@ -368,17 +374,12 @@ class Buckets:
 
     def past(self) -> SeriesPast:
         """The answer, rounded to 12 digits: these are the same in SQLite and PostgreSQL."""
-        steps, found = self.grid, sorted(self._found.items())
-        return SeriesPast(
-            steps.start_ns,
-            steps.end_ns,
-            steps.bucket_ns,
-            tuple(steps.start_ns + index * steps.bucket_ns for index, _ in found),
-            tuple(int(n) for _, (n, *_) in found),
-            tuple(_rounded(total / n) for _, (n, total, *_) in found),
-            tuple(_rounded(low) for _, (*_, low, _) in found),
-            tuple(_rounded(high) for _, (*_, high) in found),
-        )
+        steps = self.grid
+        rows = [
+            (steps.start_ns + index * steps.bucket_ns, n, *map(_rounded, (total / n, low, high)))
+            for index, (n, total, low, high) in sorted(self._found.items())
+        ]
+        return SeriesPast(steps.start_ns, steps.end_ns, steps.bucket_ns, *zip(*rows, strict=True))
 
 
 def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int) -> SeriesPast:

@@ -15,7 +15,6 @@ from itertools import repeat
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import (
     NO_FLOWER,
@@ -105,54 +104,57 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> FoldedState
     execute = connection.execute
     # By tag: the number of its first write, its last attempt, when it was observed, its readings.
     first: dict[str, int] = {}
-    last_attempts: dict[str, tuple[int, int, int, str]] = {}
+    attempts: dict[str, tuple[int, int, int, str]] = {}
     observed: dict[str, int] = {}
     found: dict[str, list[tuple[int, int, tuple[Reading, ...]]]] = {}
     scans = sorted(execute(sql.STATE_SCANS, query).fetchall())
-    scans += execute(sql.STATE_BARE_SCANS, query).fetchall()
-    for row, readings in zip(scans, _readings(scans), strict=True):
-        series, tag, kind, _, seq, stamp_ns, status, detail, _ = row
-        first.setdefault(tag, series)
-        last = last_attempts.get(tag)
-        if last is None or (stamp_ns, seq) >= last[:2]:
-            last_attempts[tag] = (stamp_ns, seq, status, detail)
-        if readings or (kind == KIND_TAG_READING and status == STATUS_OK):
+    bare = execute(sql.STATE_BARE_SCANS, query).fetchall()
+    every = named_numbers((row[2] for row in scans), [row[7] for row in scans])
+    for row, (names, values) in zip(scans, every, strict=True):
+        series, tag, _, seq, stamp_ns, status, detail, _ = row
+        attempt = stamp_ns, seq, status, detail
+        if tag not in first:
+            first[tag], attempts[tag] = series, attempt
+        elif attempt > attempts[tag]:
+            attempts[tag] = attempt
+        if values:
+            readings = tuple(map(Reading, names, values, repeat(stamp_ns)))
+            found.setdefault(tag, []).append((stamp_ns, seq, readings))
             if stamp_ns > observed.get(tag, -1):
                 observed[tag] = stamp_ns
-            found.setdefault(tag, []).append((stamp_ns, seq, readings))
-    flowers: dict[str, tuple[int, Flower]] = {}
+    for _, tag, _, _, stamp_ns, *_ in bare:
+        observed[tag] = max(stamp_ns, observed.get(tag, -1))
+    flowers: dict[str, tuple[Flower, int]] = {}
     inspections = execute(sql.STATE_INSPECTIONS, query).fetchall()
     for series, tag, seq, stamp_ns, *flower in inspections:
         first[tag] = min(series, first.get(tag, series))
-        last_attempts[tag] = max(
-            (stamp_ns, seq, STATUS_OK, ""), last_attempts.get(tag, (-1, 0, 0, ""))
-        )
+        attempt = stamp_ns, seq, STATUS_OK, ""
+        attempts[tag] = max(attempt, attempts.get(tag, attempt))
         observed[tag] = max(stamp_ns, observed.get(tag, -1))
-        flowers[tag] = (stamp_ns, flower_of(flower))
+        flowers[tag] = flower_of(flower), stamp_ns
     poses, placed_ns = _places(execute, query, first)
-    failed = {
-        tag: execute(sql.FIRST_FAILURE, query | {"tag": tag}).fetchone()[0]
-        for tag in last_attempts.keys() - observed.keys()
-    }
-    tags = sorted(first, key=first.__getitem__)
-    attempts = {tag: Attempt(entry[0], *entry[2:]) for tag, entry in last_attempts.items()}
-    states = tuple(
-        TagState(
-            tag,
-            poses.get(tag),
-            _latest(found.get(tag, ())),
-            observed.get(tag, failed.get(tag)),
-            flowers[tag][1] if tag in flowers else NO_FLOWER,
-            flowers[tag][0] if tag in flowers else None,
-            attempts.get(tag),
+    states = []
+    for tag in sorted(first, key=first.__getitem__):
+        last, observed_ns = attempts.get(tag), observed.get(tag)
+        if last is not None and observed_ns is None:
+            (observed_ns,) = execute(sql.FIRST_FAILURE, query | {"tag": tag}).fetchone()
+        flower, inspected_ns = flowers.get(tag, (NO_FLOWER, None))
+        states.append(
+            TagState(
+                tag,
+                poses.get(tag),
+                _latest(found.get(tag, ())),
+                observed_ns,
+                flower,
+                inspected_ns,
+                last and Attempt(last[0], last[2], last[3]),
+            )
         )
-        for tag in tags
-    )
     return FoldedState(
-        states,
+        tuple(states),
         frozenset(observed),
         placed_ns,
-        tuple(dict.fromkeys(row[4] for row in scans)),
+        tuple(dict.fromkeys(row[3] for row in (*scans, *bare))),
         tuple(row[2] for row in inspections),
     )
 
@@ -161,19 +163,20 @@ def _places(
     execute: Any, query: dict[str, Any], first: dict[str, int]
 ) -> tuple[dict[str, Pose], dict[str, int]]:
     """The pose of each tag, from its first row, and the time from which the tag has one."""
+    poses: dict[str, Pose] = {}
     placed_ns: dict[str, int] = {}
-    rows: dict[str, tuple[Any, ...]] = {}
-    for row in execute(sql.PLACES, query).fetchall():
-        _, tag, stamp_ns = row[:3]
-        if tag not in rows:
-            rows[tag], placed_ns[tag] = row, stamp_ns
+    numbers: dict[str, int] = {}
+    for seq, tag, stamp_ns, _, _, *pose in execute(sql.PLACES, query).fetchall():
+        if tag not in poses:
+            poses[tag], placed_ns[tag], numbers[tag] = Pose(*pose), stamp_ns, seq
         elif stamp_ns < placed_ns[tag]:
             placed_ns[tag] = stamp_ns
-    known = [row for tag, row in rows.items() if placed_ns[tag] <= query["at"]]
-    for seq, tag, *_ in known:
-        if seq < first.get(tag, FOREVER_NS):
+    for tag, seq in numbers.items():
+        if placed_ns[tag] > query["at"]:
+            del poses[tag]
+        elif seq < first.get(tag, FOREVER_NS):
             first[tag] = seq
-    return {row[1]: Pose(*row[5:]) for row in known}, placed_ns
+    return poses, placed_ns
 
 
 def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Reading, ...]:
@@ -214,12 +217,3 @@ def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> li
             rows.append(replace(mine[0][2], stamp_ns=since_ns, own_stamp_ns=since_ns))
         rows += [row for *_, row in mine]
     return rows
-
-
-def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
-    """The readings of rows that `sql.STATE_SCANS` selects."""
-    every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
-    return [
-        tuple(map(Reading, names, values, repeat(row[5])))
-        for row, (names, values) in zip(rows, every, strict=True)
-    ]

@@ -81,14 +81,15 @@ SERIES: Final = (
 def buckets(hours: str) -> str:
     """Buckets of :width hours, of the rows of hourly counts."""
     return (
-        "SELECT (hour - :origin) / :width AS bucket, sum(n), sum(total), min(low), max(high)"
-        f" {hours} GROUP BY bucket"
+        "SELECT (hour - :origin) / :width AS bucket, CAST(sum(n) AS BIGINT),"
+        " CAST(sum(total) AS DOUBLE PRECISION), CAST(min(low) AS DOUBLE PRECISION),"
+        f" CAST(max(high) AS DOUBLE PRECISION) {hours} GROUP BY bucket"
     )
 
 
 def total(hours: str) -> str:
-    """The number of what the hourly counts have."""
-    return f"SELECT coalesce(sum(n), 0) {hours}"
+    """The number of what the hourly counts have; counting ends when at least :most are found."""
+    return f"SELECT coalesce(sum(n), 0) FROM (SELECT n {hours} LIMIT :most) AS first"
 
 
 def count(rows: str) -> str:
@@ -190,8 +191,8 @@ def outermost(table: str, way: str) -> str:
 def _states(which: str, but: str) -> str:
     """The latest scan of each series that counts at :at."""
     return (
-        "SELECT s.series, s.tag, s.kind, s.sensors, r.seq, r.stamp_ns, r.status, r.detail,"
-        " r.readings FROM series AS s CROSS JOIN scan AS r"
+        "SELECT s.series, s.tag, s.sensors, r.seq, r.stamp_ns, r.status, r.detail, r.readings"
+        " FROM series AS s CROSS JOIN scan AS r"
         f" WHERE s.site = :site AND s.run = :run {which} AND r.site = s.site AND r.seq ="
         " (SELECT seq FROM scan WHERE site = s.site AND series = s.series AND stamp_ns <= :at"
         f" AND seq >= :since {but}ORDER BY stamp_ns DESC, seq DESC LIMIT 1)"

@@ -21,7 +21,7 @@ import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { withTag } from '../store/view';
 import { selectCatalogue, selectHealth } from '../store/derived';
-import { selectHasSnapshot, selectLatestTag, selectShown, selectTag } from '../store/moment';
+import { selectHasSnapshot, selectShown, selectTag } from '../store/moment';
 import { useFetched } from '../store/fetcher';
 import { S } from '../strings';
 import { IconButton, useFocusBack } from '../widgets/controls';
@@ -41,11 +41,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const moment = useApp((state) => selectShown(state).moment);
   const hasSnapshot = useApp(selectHasSnapshot);
-  // The latest observation decides whether to fetch again, whatever moment is shown.
-  const newest = useApp((state) =>
-    JSON.stringify(selectLatestTag(state, tagId)?.wire.last_observed),
-  );
-  const source = useHistory(tagId, newest)?.source;
+  const source = useSource(tagId, tag !== undefined);
   const root = useRef<HTMLElement>(null);
 
   useFocusBack(root);
@@ -87,8 +83,8 @@ function CardBody({
 }: {
   tag: Tag;
   health: TagHealth | undefined;
-  /** Nothing or empty: not known. */
-  source: string | null | undefined;
+  /** Null or empty: not known. */
+  source: string | null;
 }): JSX.Element {
   const { at } = tag;
   // Without the estimate on the map, only readings left out of it are worth showing.
@@ -224,17 +220,14 @@ function CardReading({
   );
 }
 
-/** Least time between two fetches while a tag is scanned over and over, ms. */
+/** Least time between two attempts to fetch it, ms. */
 const PACE_MS = 500;
 
-/** A tag's history, fetched again after each observation; null until loaded. */
-function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
+/** Where the readings of a tag come from; null until loaded. A link may name a tag that the twin does not know. */
+function useSource(tagId: string, isKnown: boolean): string | null {
   const { value } = useFetched<TagHistory>(
-    // A link may name a tag that the twin does not know.
-    observation === undefined
-      ? null
-      : { key: observation, group: tagId, run: (signal) => fetchHistory(tagId, signal) },
+    isKnown ? { key: tagId, group: tagId, run: (signal) => fetchHistory(tagId, signal) } : null,
     PACE_MS,
   );
-  return value?.tag_id === tagId ? value : null;
+  return value?.tag_id === tagId ? value.source : null;
 }

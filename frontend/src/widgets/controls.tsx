@@ -33,7 +33,6 @@ const PATHS = {
   bell: 'M6 17V11a6 6 0 0 1 12 0v6M4 17h16M10 20.500h4M12 5V3',
   later: 'M12 4a8 8 0 1 0 0 16 8 8 0 0 0 0-16Zm0 4v4l3 2',
   check: 'M5 12.500l4.500 4.500L19 7',
-  pin: 'M12 3l7 9-7 9-7-9 7-9Z',
 } as const;
 
 export type IconName = keyof typeof PATHS;

@@ -60,7 +60,7 @@ def test_a_wall_screen_rotates_and_the_named_key_leaves_it(
     note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
     expect(note).to_contain_text(re.compile(r"Temperature next: Humidity in [1-5]\u00a0s"))
     # Too low for the whole list: it shows how many tags are left, and cuts none in two.
-    wall.resize(1100, 500)
+    wall.resize(1100, 440)
     row, since = places(wall, ".attention > ul > li", ".attention-do small:not(:empty)")
     assert since.right == row.right
 

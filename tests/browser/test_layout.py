@@ -1,11 +1,13 @@
 """All window sizes and vision settings: everything is there, in its place, and can be clicked."""
 
+import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
 import pytest
 from playwright.sync_api import expect
 
+from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage
 from tests.browser.places import LINES, expect_in_reach, place, places, words_below
 from tests.support.messages import occupancy_grid, scan
@@ -22,7 +24,7 @@ SIZES = ((360, 640), (820, 1180), (1440, 900), *LOW)
 # A phone, a laptop, and a phone on its side: one of each layout.
 FEW = ((360, 640), (1440, 900), LANDSCAPE)
 # Tablets held upright, and other narrow windows: map or table, and the card below the map.
-UPRIGHT = ((768, 1024), (820, 1180), (960, 896), (1090, 1100))
+UPRIGHT = ((768, 1024), (820, 1180), (960, 896), (1020, 1100))
 # A wall screen without its own scale: slow to draw.
 HUGE = (3840, 2160)
 
@@ -91,7 +93,7 @@ def test_everything_can_be_clicked(open_at: Callable[..., Hmi]) -> None:
         assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
         # In a narrower window, the reason of a tag has the room.
         sure = hmi.row("1").locator(".cell-species .faint")
-        has_room = 820 <= size[0] < 1100 or size[0] >= 1264
+        has_room = 820 <= size[0] < 1024 or size[0] >= 1264
         expect(sure).to_be_visible(visible=has_room)
         if has_room:
             assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
@@ -107,7 +109,10 @@ def test_below_the_layers_their_labelled_choices_are_always_in_sight(
 ) -> None:
     for size in ((1100, 800), (390, 844)):
         hmi = open_at(size)
+        hmi.open_details()
         hmi.page.get_by_role("button", name="Layers").click()
+        # Nothing of the details shows below it.
+        expect(hmi.page.locator(".legend-more .legend-facts")).to_be_hidden()
         expect(hmi.page.locator(".layers .check")).to_have_count(9)
         choice = hmi.test_id("compare")
         expect(choice).to_be_in_viewport(ratio=1)
@@ -177,6 +182,18 @@ def test_an_upright_window_has_the_map_or_the_table_and_a_card_below_the_map(
         assert frame.top + 200 <= frame.bottom <= card.top < card.bottom <= tabs.top
 
 
+def test_a_small_laptop_has_status_map_and_table_at_first_glance(
+    open_at: Callable[..., Hmi],
+) -> None:
+    hmi = open_at((1024, 768))
+    status, map_, table = places(hmi, ".health", ".map-frame", ".list")
+    assert map_.right < status.left == table.left
+    assert status.bottom == table.top
+    assert map_.bottom - map_.top > 400
+    for tag_id in TAGS:
+        expect(hmi.row(tag_id)).to_be_in_viewport(ratio=1)
+
+
 def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
     open_at: Callable[..., Hmi],
 ) -> None:
@@ -217,6 +234,8 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
         expect_in_reach(hmi, ".map-controls button, .legend, tbody tr, .health button")
         assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
         assert size != (1440, 900) or map_.right > 1.2 * narrow
+        # In the order of reading for the keyboard, too.
+        expect(hmi.page.locator(".health, .map-panel").first).to_have_class("health")
     hmi.resize(*UPRIGHT[1])
     show(hmi, "Map")
     map_, table = places(hmi, ".map-panel", ".list")
@@ -232,6 +251,20 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     expect(hmi.map).to_be_hidden()
     status, table = places(hmi, ".health", ".list")
     assert (status.left, status.bottom) == (table.left, table.top)
+    # On a wall screen, too.
+    hmi.resize(1280, 720)
+    hmi.go(query="?kiosk=1")
+    expect(hmi.page.locator(".panels > .health")).to_be_visible()
+    hmi.expect_map()
+    status, map_ = places(hmi, ".health", ".map-panel")
+    assert (status.left, status.bottom) == (map_.left, map_.top)
+    assert map_.right > 0.6 * 1280
+    # A tall one leaves the table what it does not need.
+    hmi.resize(1440, 900)
+    hmi.go()
+    hmi.expect_map()
+    running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
+    hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")
 
 
 def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(
@@ -256,6 +289,9 @@ def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(
     for size in FEW:
         hmi.resize(*size)
         hmi.expect_phase("live")
+        # A single task has the room of two, in larger text.
+        if size == (1440, 900):
+            expect(driver).to_have_css("font-size", "18px")
         in_place = partial(stands_at, hmi, before[size])
         hmi.expect(in_place, f"the table in its place at {size}")
     # The rest appears on hover, and a screen reader reads all of it.
@@ -437,3 +473,9 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
         hmi.resize(230, 740)
         brand = place(hmi.page.locator(".brand"))
         assert place(hmi.page.locator(".brand > span")).top >= brand.bottom
+        # While looking back, the last tab says more.
+        hmi.resize(**PHONE)
+        hmi.go("at=1795970265", f"?lang={language}")
+        count = hmi.page.locator(".pane-tabs").get_by_test_id("alarm-count")
+        expect(count).to_contain_text(re.compile("[a-z]"))
+        assert place(count).right <= PHONE["width"] - 8, language

@@ -56,7 +56,10 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
         return [box.bottom - box.top for box in places(phone, *selectors)]
 
     assert sum(heights(".health-strip", ".map-frame", ".legend")) >= tall
-    # What to do first says since when, beside how many more there are.
+    # The counts by status; and what to do first says since when, beside how many more there are.
+    counts = phone.page.locator(".strip-counts li")
+    expect(counts).to_have_text(["Critical 1", "Stressed 1", "Unknown 2", "Healthy 3"])
+    expect(counts.last).to_be_in_viewport(ratio=1)
     more = phone.page.locator(".health-strip .do-more")
     expect(more).to_have_attribute("data-short", re.compile(r"^\+ \d+ more$"))
     expect(phone.page.locator(".health-strip small")).to_be_in_viewport(ratio=1)

@@ -85,10 +85,10 @@ test('says what the marks are, and how many; where there are none, nothing', () 
   }));
   rerender(<MarksKey marks={[...all, { ...mark, kind: 'failure' }]} />);
   expect(screen.getByTestId('marks-key').textContent).toBe(
-    '○ 3 flower inspections✕ 2 failed attempts',
+    '• 3 flower inspections✕ 2 failed attempts',
   );
   rerender(<MarksKey marks={all} />);
-  expect(screen.getByTestId('marks-key').textContent).toBe('○ 3 flower inspections');
+  expect(screen.getByTestId('marks-key').textContent).toBe('• 3 flower inspections');
 });
 
 const choices = (): string[] => screen.getAllByRole('option').map((option) => option.textContent);

@@ -166,7 +166,7 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
     <p className="marks-key" data-testid="marks-key">
       {inspections > 0 && (
         <span data-mark="inspection">
-          <span aria-hidden="true">○</span> {S.chartInspections(inspections)}
+          <span aria-hidden="true">•</span> {S.chartInspections(inspections)}
         </span>
       )}
       {failures > 0 && (

@@ -1,7 +1,8 @@
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 
 import { MOST_CHARTED } from '../store/view';
-import { lookOf, markerPath, without } from './layers';
+import { drawMarks, type Frame, lookOf, markerPath, without } from './layers';
+import type { Line } from './model';
 
 const all = Array.from({ length: MOST_CHARTED }, (_, index) => lookOf(index));
 
@@ -14,6 +15,19 @@ test('each line of a chart has a colour, a dash and a marker that no other has',
 test('a marker is a path around its point', () => {
   for (const { marker } of all) expect(markerPath(marker, 10, 20, 6)).toMatch(/^M[-\d. LMaZ]+$/);
   expect(markerPath('square', 10, 20, 10)).toBe('M5.5 15.5L14.5 15.5L14.5 24.5L5.5 24.5Z');
+});
+
+test('marks of inspections are dots, smaller than the crosses of failures', () => {
+  vi.stubGlobal('Path2D', String);
+  const [fill, stroke] = [vi.fn(), vi.fn()];
+  const box = { left: 0, top: 0, width: 100, height: 50 };
+  const frame = { context: { fill, stroke }, ratio: 1, box, x: Number, colour: String };
+  const marks = (['inspection', 'failure'] as const).map((kind) => ({
+    ...{ kind, at: 30, widthS: 0, count: 1 },
+  }));
+  drawMarks(frame as unknown as Frame, { marks } as unknown as Line);
+  expect(String(fill.mock.calls[0])).toBe(markerPath('circle', 30, 58, 3));
+  expect(String(stroke.mock.calls[0])).toBe(markerPath('cross', 30, 70, 6));
 });
 
 test('a gap is hatched once: where the journal is incomplete, only as that', () => {

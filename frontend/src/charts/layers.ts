@@ -19,8 +19,8 @@ export interface Frame {
 }
 
 /** Closer together than this, markers would hide the line; CSS pixels. */
-const MARKER_ROOM = 9;
-const MARKER_SIZE = 6;
+const MARKER_ROOM = 14;
+const MARKER_SIZE = 5;
 
 function clip({ context, box }: Frame): void {
   context.save();
@@ -190,25 +190,29 @@ function drawMarkers({ context, ratio, x, y, box, model, colour }: Frame, line: 
 }
 
 /** Marks of one kind closer together than this are merged; CSS pixels. */
-const MARK_ROOM = 7;
-const MARK_SIZE = 7;
+const MARK_ROOM = 6;
+/** Widths of the marks; an inspection is ordinary, and must not outweigh the lines. */
+const MARK_SIZES = { inspection: 3, failure: 6 } as const;
 /** Height of the marks' own lane, between values and times; CSS pixels. */
 export const MARKS_LANE = 24;
 
 export function drawMarks({ context, ratio, x, box, colour }: Frame, { marks }: Line): void {
   const bottom = box.top + box.height;
-  context.lineWidth = 1.75 * ratio;
+  context.lineWidth = 1.5 * ratio;
+  context.fillStyle = colour('chart-inspection');
+  context.strokeStyle = colour('chart-failure');
   for (const kind of ['inspection', 'failure'] as const) {
     const isFailure = kind === 'failure';
-    context.strokeStyle = isFailure ? colour('chart-failure') : colour('chart-inspection');
     const y = bottom + (isFailure ? 20 : 8) * ratio;
     let last = -Infinity;
     for (const mark of marks) {
       const at = x(mark.at + mark.widthS / 2);
       if (mark.kind !== kind || at - last < MARK_ROOM * ratio) continue;
       last = at;
-      const size = MARK_SIZE * ratio;
-      context.stroke(new Path2D(markerPath(isFailure ? 'cross' : 'ring', at, y, size)));
+      const marker = isFailure ? 'cross' : 'circle';
+      const path = new Path2D(markerPath(marker, at, y, MARK_SIZES[kind] * ratio));
+      if (isFailure) context.stroke(path);
+      else context.fill(path);
     }
   }
 }

@@ -61,13 +61,13 @@ export function selectLatestHealth(state: AppState): HouseHealth | null {
   return snapshot && healthNow(snapshot.tags, health, isReceivingNow(state));
 }
 
-/** A greenhouse is wide if it is at least this many times as wide as deep. */
-const WIDE = 2;
-
-/** By the floor plan: few tags say nothing about it. Of now, so that the layout stays while looking back. */
-export function selectIsWide(state: AppState): boolean {
+/**
+ * How many times as wide as deep the greenhouse is, by the floor plan: few tags say nothing about it. Null:
+ * no plan. Of now, so that the layout stays while looking back.
+ */
+export function selectAspect(state: AppState): number | null {
   const bounds = boundsOf(selectLatest(state).map.value?.known ?? []);
-  return bounds !== null && bounds.maxX - bounds.minX >= WIDE * (bounds.maxY - bounds.minY);
+  return bounds && (bounds.maxX - bounds.minX) / (bounds.maxY - bounds.minY);
 }
 
 const cataloguesIn = memoLast(cataloguesOf);

@@ -1,10 +1,10 @@
-import type { JSX } from 'react';
+import { type CSSProperties, type JSX, useSyncExternalStore } from 'react';
 
 import type { CycleSetting } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
 import { useSelected } from '../store/create';
-import { selectHealth, selectIsWide } from '../store/derived';
+import { selectAspect, selectHealth } from '../store/derived';
 import { selectHasSnapshot, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { AlarmsLabel } from './alarms/ListChoice';
@@ -12,6 +12,7 @@ import { Announcer } from './Announcer';
 import { FrozenBanner, Troubles } from './Troubles';
 import { Header, SimulatedNote } from './Header';
 import { HealthMark } from './HealthMark';
+import { HealthSummary } from './HealthSummary';
 import { Icon } from '../widgets/controls';
 import { MapPanel } from './MapPanel';
 import { TagsPanel } from './TagsPanel';
@@ -33,7 +34,11 @@ export function App({
   const moment = useApp((state) => selectShown(state).moment);
   const isPast = moment !== null;
   const isRecorded = useApp(selectIsRecorded);
-  const isWide = useApp(selectIsWide);
+  const aspect = useApp(selectAspect);
+  const isWide = (aspect ?? 0) >= WIDE;
+  const isRoomy = useSyncExternalStore(onRoom, () => roomy.matches);
+  const hasCharts = useApp((state) => state.view.chart !== null);
+  const isStatusAbove = isWide && isRoomy && (kiosk || !hasCharts);
 
   return (
     <div
@@ -60,9 +65,14 @@ export function App({
         <SimulatedNote />
       </div>
       <WithParts>{(parts) => <parts.PaperLine />}</WithParts>
-      <main className="panels" data-wide={isWide && !kiosk}>
+      <main
+        className="panels"
+        data-wide={isWide && !kiosk}
+        style={{ '--aspect': aspect ?? WIDE } as CSSProperties}
+      >
+        {isStatusAbove && <HealthSummary kiosk={kiosk} />}
         <MapPanel kiosk={kiosk} />
-        <TagsPanel kiosk={kiosk} />
+        <TagsPanel kiosk={kiosk} hasStatus={!isStatusAbove} />
         {selected !== null && !kiosk && (
           <WithParts>{(parts) => <parts.TagCard key={selected} tagId={selected} />}</WithParts>
         )}
@@ -77,6 +87,19 @@ export function App({
       </div>
     </div>
   );
+}
+
+/** A greenhouse is wide if it is at least this many times as wide as deep. */
+const WIDE = 2;
+
+/** Has room for the status above the map of a wide greenhouse. */
+const roomy = window.matchMedia('(min-width: 64em) and (min-height: 43em)');
+
+function onRoom(listener: () => void): () => void {
+  roomy.addEventListener('change', listener);
+  return () => {
+    roomy.removeEventListener('change', listener);
+  };
 }
 
 const NO_CYCLE: CycleSetting = { seconds: null, refused: null };

@@ -2,7 +2,7 @@ import { Fragment, useMemo, type JSX } from 'react';
 
 import { selectKnownSince } from '../alarms/latest';
 import { sinceText } from '../alarms/words';
-import { alarmOf, isAwaited, oldestOf, type Item } from '../alarms/list';
+import { alarmOf, countText, isAwaited, oldestOf, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason, Verdict } from '../contract/types';
@@ -17,6 +17,7 @@ import {
   todoText,
   VERDICTS,
 } from '../domain/health';
+import { numberText } from '../domain/format';
 import { groupedBy } from '../domain/memo';
 import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
@@ -257,10 +258,14 @@ export function Overall({
   const reason = useCauseText(own ? [own] : []);
   // The alarm list is always live.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const active = useSelected(alarmList, (list) => list.active.length);
+  const active = useSelected(alarmList, (list) => countText(list, 'active'));
   // What to do about a clock's fault is in the banner.
   const lacksTime = useApp(selectClockFault) !== null && isSilent(health);
-  const text = lacksTime ? S.healthNoTime : own ? reason : overallText(health, isNow ? active : 0);
+  const text = lacksTime
+    ? S.healthNoTime
+    : own
+      ? reason
+      : overallText(health, isNow ? active : '0');
   const hasSnapshot = useApp(selectHasSnapshot);
   if (text === null || !hasSnapshot) return null;
   return (
@@ -292,24 +297,31 @@ export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.
 }
 
 /** Null: the tags' own lines say it. */
-function overallText({ verdict, counts }: HouseHealth, alarms: number): string | null {
+function overallText({ verdict, counts }: HouseHealth, alarms: string): string | null {
   if (isBad(verdict)) return null;
-  if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
+  if (verdict === 'healthy') return alarms !== '0' ? S.healthDespite(alarms) : S.healthAllWell;
   const { unknown } = counts;
   if (unknown === 0) return S.healthNothing;
   const all = VERDICTS.reduce((sum, each) => sum + counts[each], 0);
   return 2 * unknown > all ? S.healthMostUnknown : S.healthSomeUnknown(unknown);
 }
 
-/** The most urgent task, above the map on a phone, where the table is a tab away. */
+/** The counts and the most urgent task, above the map on a phone, where the table is a tab away. */
 export function HealthStrip(): JSX.Element {
-  const verdict = useApp((state) => selectHealth(state).verdict);
+  const { verdict, counts } = useApp(selectHealth);
   const hasSnapshot = useApp(selectHasSnapshot);
   return (
     <div className="health-strip" data-testid="health-strip" data-health={verdict}>
       {hasSnapshot && <HealthMark verdict={verdict} word={false} />}
       <ShelvedCount />
       <DoNow most={1} id="health-first" />
+      <ul className="strip-counts">
+        {VERDICTS.filter((each) => counts[each] > 0).map((each) => (
+          <li key={each}>
+            <HealthMark verdict={each} word={false} /> {numberText(counts[each], 0)}
+          </li>
+        ))}
+      </ul>
     </div>
   );
 }

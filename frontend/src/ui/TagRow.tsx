@@ -140,17 +140,11 @@ export const TagRow = memo(function TagRow(props: Props): JSX.Element {
       ))}
       {has('species') && (
         <td className="cell-species">
-          {tag.species ? (
-            <>
-              <bdi>{speciesText(tag.species, 28)}</bdi>
-              {tag.speciesConfidence !== null && (
-                <span className="faint" title={S.confidence(percentText(tag.speciesConfidence))}>
-                  {percentText(tag.speciesConfidence)}
-                </span>
-              )}
-            </>
-          ) : (
-            <span className="faint">{S.noValue}</span>
+          {tag.species && <bdi>{speciesText(tag.species, 28)}</bdi>}
+          {tag.species && tag.speciesConfidence !== null && (
+            <span className="faint" title={S.confidence(percentText(tag.speciesConfidence))}>
+              {percentText(tag.speciesConfidence)}
+            </span>
           )}
         </td>
       )}
@@ -195,12 +189,8 @@ const isOlder = (when: When, row: When): boolean =>
 function Reading({ sensor, row: { tag, health }, look }: CellProps): JSX.Element {
   const value = tag.readings.get(sensor.name);
   if (value === undefined) {
-    return (
-      <span className="faint">
-        <span aria-hidden="true">{S.noValue}</span>
-        <span className="unseen">{S.pinLacking}</span>
-      </span>
-    );
+    // Blank, so that the readings stand out.
+    return <span className="unseen">{S.pinLacking}</span>;
   }
   if (value === null) {
     return (

@@ -13,11 +13,17 @@ import { EmptyTable } from './Notices';
 import { TagTable } from './TagTable';
 import { LONGEST_ON_PAPER, useTopAfter } from './visibleRows';
 
-export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
+export function TagsPanel({
+  kiosk,
+  hasStatus,
+}: {
+  kiosk: boolean;
+  hasStatus: boolean;
+}): JSX.Element {
   const list = useApp((state) => state.view.list);
   return (
     <section className="tags-panel" aria-label={S.tags} id="tags" tabIndex={-1}>
-      <HealthSummary kiosk={kiosk} />
+      {hasStatus && <HealthSummary kiosk={kiosk} />}
       {kiosk ? (
         <WithParts>{(parts) => <parts.AttentionList />}</WithParts>
       ) : (

@@ -12,6 +12,7 @@ import { S } from '../../strings';
 import { judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
+import { HealthSummary } from '../HealthSummary';
 import { AlarmPanel } from './AlarmPanel';
 
 let stop: () => void;
@@ -52,6 +53,12 @@ test('of many of one cause the worst, then five, then a hundred more at a time',
   // The bridge sends no more than 1,000.
   report(...Array.from({ length: 1_000 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
   expect(screen.getByText('Active (1,000+)')).toBeTruthy();
+  // The status above says the same.
+  act(() => {
+    showTags([wireTag()], judgement({ [wireTag().tag_id]: 'healthy' }));
+  });
+  render(<HealthSummary kiosk={false} />);
+  expect(screen.getByTestId('health-driver').textContent).toMatch(/^1,000\+ alarms are still/);
 });
 
 test('only who acknowledged an alarm, or an admin, may take that back', () => {

@@ -203,7 +203,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   idealParts: { any: 'ideal', day: 'ideal tagsüber', night: 'ideal nachts' },
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
-    alarms === 1
+    alarms === '1'
       ? '1 Alarm steht noch an: mit der nächsten guten Messung oder Kontrolle behoben'
       : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung oder Kontrolle behoben`,
   healthAcknowledged: 'quittiert',

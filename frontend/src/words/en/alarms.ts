@@ -212,8 +212,8 @@ export const HEALTH = {
   /** "any": the same by day and by night. */
   idealParts: { any: 'ideal', day: 'daytime ideal', night: 'night-time ideal' },
   healthAllWell: 'All assessed readings are within their ideal ranges',
-  healthDespite: (alarms: number): string =>
-    alarms === 1
+  healthDespite: (alarms: string): string =>
+    alarms === '1'
       ? '1 alarm is still active: the next good scan or inspection resolves it'
       : `${alarms} alarms are still active: the next good scan or inspection resolves each`,
   healthAcknowledged: 'acknowledged',

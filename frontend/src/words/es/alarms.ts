@@ -210,7 +210,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   idealParts: { any: 'ideal', day: 'ideal de día', night: 'ideal de noche' },
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
-    alarms === 1
+    alarms === '1'
       ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición o revisión buena'
       : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición o revisión buena`,
   healthAcknowledged: 'reconocida',

@@ -194,7 +194,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
-    alarms === 1
+    alarms === '1'
       ? '1 alarm is nog actief: opgelost bij de volgende goede meting of controle'
       : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting of controle`,
   healthAcknowledged: 'bevestigd',

@@ -10,7 +10,6 @@ const [url, scenario, ...topics] = process.argv.slice(2);
 
 const statuses = [];
 const errors = [];
-const times = [];
 const channels = new Map();
 
 /** A client that is connected, once it has been told who serves and what. */
@@ -19,7 +18,6 @@ async function connect(subprotocol = FoxgloveClient.SUPPORTED_SUBPROTOCOL) {
   const client = new FoxgloveClient({ ws });
   client.on('status', ({ level, message }) => statuses.push({ level, message }));
   client.on('error', (error) => errors.push(String(error)));
-  client.on('time', ({ timestamp }) => times.push(String(timestamp)));
   client.on('unadvertise', (ids) => ids.forEach((id) => channels.delete(id)));
   const info = new Promise((resolve) => client.on('serverInfo', resolve));
   const advertised = new Promise((resolve) =>
@@ -108,13 +106,6 @@ const scenarios = {
     client.subscribe(4_000_000);
     await until(() => statuses.length >= 12);
     return {};
-  },
-
-  /** Follows simulated time. */
-  async time() {
-    // Where it stands it is told once, right behind the channels.
-    const { info } = await connect();
-    return { info, timestamp: await until(() => times[0]) };
   },
 };
 

@@ -67,9 +67,6 @@ const scenarios = {
   async names() {
     return {
       topics: await asked('getTopics'),
-      topicType: await asked('getTopicType', STATE.name),
-      services: await asked('getServices'),
-      serviceType: await asked('getServiceType', FIELD.name),
       nodes: await asked('getNodes').catch((reason) => ({ failed: reason })),
     };
   },

@@ -74,8 +74,11 @@ def commands(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
 
 
 def test_every_option_of_the_bridge_is_a_setting_of_the_reference() -> None:
-    taken = options_of(commands(parser())["serve"]) - {"--help", "--config"}
+    serve = commands(parser())["serve"]
+    taken = options_of(serve) - {"--help", "--config"}
     assert len(taken) > 20
+    # A default that does something is not "none".
+    assert re.search(r"usual scan interval; [^-]* \(default:\s+0", serve.format_help())
     assert taken == {name for name in listed("settings") if name.startswith("--")}
 
 

@@ -163,16 +163,9 @@ def check_refusals(live: Bridge) -> None:
         assert (answer.status_code, message in answer.text) == (400, True), answer.text
     answer = live.http.get(f"/api/report.html?to={T0}&lang=fr")
     assert (answer.status_code, "lang" in answer.json()["detail"]) == (400, True)
-    html = {"Accept": "text/html,*/*;q=0.8"}
-    page = live.http.get("/api/report.html?from=<b>&lang=de", headers=html)
-    assert (page.status_code, page.headers["content-type"]) == (400, "text/html; charset=utf-8")
-    assert "Kein Bericht" in page.text
-    assert "from is &#x27;&lt;b&gt;&#x27;" in page.text
-    assert '<a href="">Erneut versuchen</a>' in page.text
-    assert page.headers["content-security-policy"].startswith("default-src 'none'; style-src")
     for zone in ("Mars", "Europe", "../zone.tab", "/etc/localtime", "a" * 300):
         answer = live.http.get(f"/api/report.html?to={T0}&time_zone={zone}")
-        assert (answer.status_code, "times are in UTC" in answer.text) == (200, True), zone
+        assert (answer.status_code, "Times: UTC" in answer.text) == (200, True), zone
     # The future is left out, and a shift is eight hours.
     report = live.json(f"/api/report?to={2**31 - 1}")
     assert report["to"]["sec"] - report["from"]["sec"] == 8 * HOUR

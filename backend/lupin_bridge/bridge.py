@@ -214,7 +214,6 @@ class Bridge:
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
         latest = self.latest
-        tags = () if latest is None else latest.snapshot.tags
         journal = source.journal()
         yield "lupin_clients", len(hub)
         yield "lupin_clients_blocked", hub.blocked
@@ -222,7 +221,6 @@ class Bridge:
         yield "lupin_frames_sent", hub.frames_sent
         yield "lupin_frames_skipped", hub.frames_skipped
         yield "lupin_bytes_sent", hub.bytes_sent
-        yield "lupin_topics_relayed", len(source.relay)
         yield "lupin_messages_sent", self.offer.counts.sent
         yield "lupin_messages_skipped", self.offer.counts.skipped + source.relay.skipped
         yield "lupin_ros_thread_alive", source.thread.is_alive
@@ -234,26 +232,16 @@ class Bridge:
             "lupin_state_age_seconds",
             math.inf if status.state_age_s is None else status.state_age_s,
         )
-        yield "lupin_tags", len(tags)
-        yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
+        yield "lupin_tags", 0 if latest is None else len(latest.snapshot.tags)
         yield "lupin_judge_errors", self._states_unjudged
         yield "lupin_alarms_known", self.alarms.now.source != "starting"
         yield "lupin_alarms_active", len(self.alarms.now.active)
         yield "lupin_alarms_missed", self.alarm_feed.missed
         yield "lupin_alarms_raised", self.alarms_raised
         yield "lupin_fields_computing", self.admission.being_computed
-        yield "lupin_exports_running", self.admission.exporting
-        yield "lupin_work_abandoned", source.workers.abandoned
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
         yield from self.outward.counts()
-        known = self.estimates.known
-        trusted = {name: report.record.is_trusted for name, report in known.items()}
-        yield "lupin_estimate_trusted", {name: it for name, it in trusted.items() if it is not None}
-        yield (
-            "lupin_estimate_fit_failing",
-            {name: bool(report.fit_problem) for name, report in known.items()},
-        )
         # Counts that the twin does not report are absent, not zero.
         for name, counts in (
             ("lupin_dropped", None if latest is None else latest.counts),

@@ -12,7 +12,7 @@ import os
 import sqlite3
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any, Final, TextIO, TypeAlias
@@ -35,21 +35,15 @@ def tell(*lines: str) -> None:
 
 
 class Progress:
-    """Progress on the standard error: on a terminal, one line that is overwritten."""
+    """Progress on the standard error, if that is a terminal: one line that is overwritten."""
 
     def __init__(self) -> None:
         self._is_seen = sys.stderr.isatty()
-        self._what = ""
         self._reported_s = 0.0
 
     def tell(self, what: str, share: float) -> None:
-        """Show the current step, and the share of it that is done, 0 to 1."""
-        is_new, self._what = what != self._what, what
-        if not self._is_seen:
-            if is_new:
-                _written(sys.stderr, f"{what}\n")
-            return
-        if is_new or time.monotonic() - self._reported_s >= _AGAIN_AFTER_S:
+        """Show the share of the work that is done, 0 to 1."""
+        if self._is_seen and time.monotonic() - self._reported_s >= _AGAIN_AFTER_S:
             self._reported_s = time.monotonic()
             _written(sys.stderr, f"\r\x1b[K{what} {share:.0%}")
 
@@ -113,10 +107,8 @@ def user() -> str:
 _PAGES_AT_ONCE: Final = 1000
 
 
-def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], None]) -> int:
+def backup(journal: sqlite3.Connection, target: Path) -> int:
     """Copy a journal to a new file by SQLite's online backup; returns the file's size, bytes.
-
-    `report` gets the copied share, 0 to 1.
 
     Raises:
         CommandError: `target` exists, or cannot be created or written.
@@ -137,11 +129,7 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
         if_unfinished.callback(target.unlink)
         try:
             with closing(sqlite3.connect(target)) as copy:
-                journal.backup(
-                    copy,
-                    pages=_PAGES_AT_ONCE,
-                    progress=lambda _, rest, total: report(1 - rest / max(total, 1)),
-                )
+                journal.backup(copy, pages=_PAGES_AT_ONCE)
         except sqlite3.Error as error:
             raise CommandError(f"cannot copy to {target}: {error}") from error
         if_unfinished.pop_all()

@@ -9,7 +9,7 @@ import colorsys
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final, Literal
 from urllib.parse import quote
@@ -125,47 +125,22 @@ def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_ce
         )
 
 
-def negotiate(accept: str | None) -> FieldFormat | None:
-    """The format that an Accept header prefers, JSON by default; None: none is acceptable.
+def negotiate(accept: str) -> FieldFormat:
+    """The format of the first media type in an Accept header that has one; JSON if none has."""
+    for name in listed(accept):
+        for candidate in FORMATS:
+            main_type = candidate.media_type.partition("/")[0]
+            if name in {candidate.media_type, f"{main_type}/*", "*/*"}:
+                return candidate
+    return JSON
 
-    RFC 9110, section 12.5.1: the most specific range that matches a format gives its weight.
+
+def listed(header: str) -> list[str]:
+    """The items of an Accept header, in lower case and in its order, without their weights.
+
+    Programs list what they prefer first, so weights would change nothing.
     """
-    if not accept or not accept.strip():
-        return JSON
-    ranges = weighted(accept)
-    best, best_weight = None, 0.0
-    for candidate in FORMATS:
-        weight = _weight(candidate.media_type, ranges)
-        if weight > best_weight:
-            best, best_weight = candidate, weight
-    return best
-
-
-def weighted(header: str) -> list[tuple[str, float]]:
-    """The items of an Accept header, in lower case, with their weights (RFC 9110, section 12.4.2).
-
-    An invalid weight counts as 0.
-    """
-    found = []
-    for part in header.lower().split(","):
-        name, *options = (piece.strip() for piece in part.split(";"))
-        weight = 1.0
-        for option in options:
-            key, _, value = option.partition("=")
-            if key.strip() == "q":
-                try:
-                    weight = min(1.0, max(0.0, float(value)))
-                except ValueError:
-                    weight = 0.0
-        found.append((name, weight if weight == weight else 0.0))  # noqa: PLR0124  # NaN
-    return found
-
-
-def _weight(media_type: str, ranges: Iterable[tuple[str, float]]) -> float:
-    main_type = media_type.partition("/")[0]
-    by_specificity = {media_type: 3, f"{main_type}/*": 2, "*/*": 1}
-    found = [(by_specificity[name], weight) for name, weight in ranges if name in by_specificity]
-    return max(found)[1] if found else 0.0
+    return [part.partition(";")[0].strip() for part in header.lower().split(",")]
 
 
 def matches(if_none_match: str | None, tag: str) -> bool:

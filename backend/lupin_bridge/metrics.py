@@ -34,28 +34,20 @@ counter = partial(Described, "counter")
 METRICS: Final = {
     "lupin_clients": gauge("WebSocket clients that follow the state"),
     "lupin_clients_blocked": gauge("clients whose socket accepts no data at the moment"),
-    "lupin_topics_relayed": gauge("ROS topics that the bridge relays to viewers"),
     "lupin_ros_thread_alive": gauge("1 while the ROS thread runs"),
     "lupin_ros_calls_waiting": gauge("calls waiting for the ROS thread"),
     "lupin_twin_live": gauge("1 while the twin is live"),
     "lupin_twins": gauge("twins that publish the state; more than 1 is a fault"),
     "lupin_state_age_seconds": gauge("seconds since the last state arrived; infinite: none has"),
     "lupin_tags": gauge("tags that the twin knows"),
-    "lupin_tags_pinned": gauge("tags that have a pose"),
     "lupin_alarms_known": gauge("1 once past alarms are known"),
     "lupin_alarms_active": gauge("active alarms"),
     "lupin_fields_computing": gauge("field requests being computed now"),
-    "lupin_exports_running": gauge("exports being sent now"),
     "lupin_journal_recording": gauge("1 while the journal records observations"),
     "lupin_journal_rows_waiting": gauge("observations not yet written to the journal"),
     "lupin_journal_behind_seconds": gauge("seconds that the oldest of those has waited"),
     "lupin_journal_file_bytes": gauge("size of the journal file on disk"),
     "lupin_outward_connected": gauge("1 while the receiving side accepts messages", "channel"),
-    "lupin_estimate_trusted": gauge(
-        "1 while about as many scans as expected lie in the predicted range; absent: too few scans",
-        "sensor",
-    ),
-    "lupin_estimate_fit_failing": gauge("1 while the last fit of its model has failed", "sensor"),
     "lupin_outward_waiting": gauge(
         "changes of alarms not yet sent; MQTT: 0 if the broker has the current state", "channel"
     ),
@@ -77,7 +69,6 @@ METRICS: Final = {
     "lupin_judge_errors": counter(
         "states that could not be judged, which leaves every status unknown"
     ),
-    "lupin_work_abandoned": counter("computations stopped because nobody waited for them any more"),
     "lupin_journal_rows": counter("observations written to the journal"),
     "lupin_journal_rows_lost": counter(
         "observations lost because the journal could not be written"

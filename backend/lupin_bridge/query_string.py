@@ -248,9 +248,6 @@ class OfNotes(OfPeriod):
     """The parameters of `/api/notes`."""
 
     subject: str | None = parameter("only about this: `alarm:ID`, `tag:ID` or `site`; default: all")
-    kind: Literal["acknowledge", "shelve", "comment"] | None = parameter(
-        "only this kind; default: all"
-    )
 
 
 # The default length of a report's period: a shift.
@@ -273,7 +270,7 @@ class OfReportPage(OfReport):
     lang: Literal["en", "de", "nl", "es"] = parameter("language of the page", "en")
     time_zone: str | None = parameter(
         "time zone of the page's times, such as Europe/Amsterdam; default: the setting "
-        "`time_zone`; UTC if this machine does not know it"
+        "`time_zone`, also if this machine does not know the zone"
     )
 
 

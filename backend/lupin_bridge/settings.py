@@ -3,12 +3,11 @@
 A field's type states its valid values; `settings_from` has pydantic check them.
 
 The command line takes precedence over the environment, and that over a file. An error message names
-the setting as its operator gave it: as an option, a variable, or a file's line and key.
+the setting as its operator gave it: as an option, a variable, or a key of a file.
 """
 
 from __future__ import annotations
 
-import difflib
 import logging
 import re
 import stat
@@ -100,7 +99,7 @@ class Settings:
     sensors: str = _setting(
         "",
         "JSON file with every sensor's label, unit, colour and ranges; empty: the built-in one",
-        group="judgement",
+        group="status",
     )
     reading_validity_s: Annotated[float, Interval(ge=0.0, le=604_800.0)] = _setting(
         0.0, "how long a reading is valid, s; 0: three times the tag's usual scan interval"
@@ -155,7 +154,7 @@ class Settings:
     journal: str = _setting(
         "",
         "for web: its twin's journal, if this machine sees the file under a different path",
-        group="past",
+        group="history",
     )
     site: str = _setting(
         "",
@@ -174,7 +173,7 @@ class Settings:
     log_level: Literal["debug", "info", "warning", "error"] = _setting(
         "info", "lowest level that is logged"
     )
-    # How the operator gave each setting: an option, a variable, or a file's line and key.
+    # How the operator gave each setting: an option, a variable, or a key of a file.
     given_as: Mapping[str, str] = field(
         default_factory=dict, repr=False, compare=False, kw_only=True
     )
@@ -373,7 +372,7 @@ def strange_variables(environment: Iterable[str]) -> list[str]:
     """
     known = {*_NOT_IN_THE_TABLE, *(variable(spec.name) for spec in table())}
     return [
-        f"environment variable {name} is not a setting of the bridge{meant(name, known)}"
+        f"environment variable {name} is not a setting of the bridge"
         for name in sorted(environment)
         if name.startswith(ENV_PREFIX) and name not in known
     ]
@@ -385,16 +384,16 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
         content = tomllib.loads(text)
     except ValueError as error:
         raise SettingError(f"{path} is not TOML: {error}") from None
-    names = [spec.name for spec in table()]
+    names = {spec.name for spec in table()}
     for key, value in content.items():
-        place = f"{path}{_line_of(key, text)}: {key if _BARE.fullmatch(key) else repr(key[:64])}"
+        place = f"{path}: {key if _BARE.fullmatch(key) else repr(key[:64])}"
         if key in SECRETS:
             raise SettingError(
                 f"{place} is not a setting: put the {key.rpartition('_')[2]} into a file of its "
                 f"own, and name that file with {key}_file"
             )
         if key not in names:
-            raise SettingError(f"{place} is not a setting of the bridge{meant(key, names)}")
+            raise SettingError(f"{place} is not a setting of the bridge")
         yield key, place, value
 
 
@@ -416,15 +415,3 @@ def read_text(path: str, called: str, max_bytes: int = MAX_FILE_BYTES) -> str:
         return content.decode()
     except UnicodeDecodeError:
         raise SettingError(f"{called} {path} is not UTF-8 text") from None
-
-
-def _line_of(key: str, text: str) -> str:
-    # tomllib reports no positions. No setting is a table, so each key starts a line.
-    found = re.search(rf"""^[ \t\[]*["']?{re.escape(key)}["']?[ \t]*[=.\]]""", text, re.MULTILINE)
-    return "" if found is None else f" line {text.count(chr(10), 0, found.start()) + 1}"
-
-
-def meant(name: str, known: Iterable[str]) -> str:
-    """The known name that is most like a wrong one, as a question; empty: none is."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return f" (did you mean {near[0]}?)" if near else ""

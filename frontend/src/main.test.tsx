@@ -21,16 +21,15 @@ afterEach(() => {
 
 test.each([
   // In this order: what a page has begun to listen to lasts as long as the document.
-  ['?kiosk', 'light', 0],
-  ['', 'dark', 1],
-])('with “%s” the key T leaves it %s', async (query, theme, buttons) => {
+  ['?kiosk', 'tags', 0],
+  ['', 'alarms', 1],
+])('with “%s” the key A leaves the list of %s', async (query, list, buttons) => {
   history.replaceState(null, '', `/${query}`);
   await flush(() => import('./main'));
   const { loadParts } = await import('./ui/loadDeferred');
   await flush(() => loadParts());
   const { store } = await import('./store/app');
-  fireEvent.keyDown(document.body, { key: 't' });
-  expect(document.documentElement.dataset['theme']).toBe(theme);
-  expect(store.get().settings.theme).toBe(theme === 'dark' ? 'dark' : 'system');
+  fireEvent.keyDown(document.body, { key: 'a' });
+  expect(store.get().view.list).toBe(list);
   expect(document.querySelectorAll('.menu')).toHaveLength(buttons);
 });

@@ -6,7 +6,6 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import pytest
 from geometry_msgs.msg import Point, Polygon, Pose, Quaternion
@@ -95,32 +94,26 @@ class Page(HTMLParser):
         return [attrs[name] or "" for _, attrs in self.tags if name in attrs]
 
 
-def test_every_route_field_and_parameter_is_listed_with_a_line_for_curl() -> None:
+def test_every_route_and_parameter_is_listed_with_a_line_for_curl() -> None:
     text = Page(PAGE).text
     for path, described in ROUTES.items():
         assert (f"GET {path}" in text) == described
         assert (f"curl 'http://twin:8000{path}" in text) == described
     assert "curl 'http://twin:8000/api/field.png?sensor_type=…'" in text
-    for described_type in DOCUMENT["components"]["schemas"].values():
-        assert all(field in text for field in described_type["properties"])
     for parameter in DOCUMENT["paths"]["/api/field"]["get"]["parameters"]:
         assert parameter["description"] in text
 
 
-def test_every_type_is_listed_every_link_leads_to_one_and_nothing_is_loaded() -> None:
+def test_the_page_of_routes_loads_nothing_but_its_style() -> None:
     page = Page(PAGE)
-    named = page.attributes("id")
-    assert set(DOCUMENT["components"]["schemas"]) < set(named)
-    links = page.attributes("href")
-    elsewhere = {"openapi.json", "docs/guide/", "docs.css"}
-    assert {unquote(link) for link in links} - elsewhere == {f"#{name}" for name in named}
+    assert page.attributes("href") == ["docs.css", "openapi.json", "docs/guide/"]
     tags = [tag for tag, _ in page.tags]
     assert not set(tags) & {"script", "style", "img", "iframe"}
     assert tags.count("link") == 1
     assert page.attributes("style") == []
 
 
-@pytest.mark.parametrize("kind", ["route", "parameter", "type", "address"])
+@pytest.mark.parametrize("kind", ["route", "parameter", "address"])
 def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
     markup, address = "<script>alert('x')</script>", "http://twin"
     hostile = json.loads(document())
@@ -128,8 +121,6 @@ def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
         hostile["paths"][f"/{markup}"] = hostile["paths"]["/api/state"]
     elif kind == "parameter":
         hostile["paths"]["/api/field"]["get"]["parameters"][0]["description"] = markup
-    elif kind == "type":
-        hostile["components"]["schemas"]["Time"]["description"] = markup
     else:
         address = f"http://{markup}"
     page = Page(render(hostile, address))

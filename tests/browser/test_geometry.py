@@ -70,10 +70,12 @@ def test_an_unknown_cell_shows_the_map_below_it(domain: int, open_page: OpenPage
         rows[3][4] = 100
         running.peer.publish_map(occupancy_grid(rows, origin=Pose(position=Point(x=-2.0, y=-2.0))))
         running.tag("hot")
-        # The range begins far below every value, so that even the minimum has a colour, and so
+        # The range begins far below the other values, so that each of them has a colour, and so
         # would a zero in a cell's place.
-        hmi = open_page(running.url, f"{VIEW}&colour=value&layers=map,field&range=-30,30")
-        hmi.expect_samples(4)
+        running.peer.observe(scan("coldest", {"temperature": -30.0}, at=(5.8, -1.8)))
+        running.tag("coldest")
+        hmi = open_page(running.url, f"{VIEW}&colour=value&layers=map,field")
+        hmi.expect_samples(5)
         wall, free, corner = (2.5, 1.5), (2.5, 0.5), (-1.4, -1.4)
         known = [(0.5, 0.5), (4.5, 3.5), (0.5, 3.5), (4.5, 0.5)]
         shares = [40 / 60, 1.0, 40 / 60, 40 / 60]
@@ -82,7 +84,7 @@ def test_an_unknown_cell_shows_the_map_below_it(domain: int, open_page: OpenPage
         hmi.expect_pixels(lambda pixel: pixel != hmi.pixel(2.5, 0.5), known[1], what="a field")
         with_field = hmi.settled_picture()
         view = hmi.view()
-        hmi.turn(f"{VIEW}&colour=value&layers=map&range=-30,30")
+        hmi.turn(f"{VIEW}&colour=value&layers=map")
         expect(hmi.row("hot")).to_be_visible()
         hmi.expect_pixels(lambda pixel: close(pixel, WALL), wall, what="the wall")
         bare = hmi.settled_picture()

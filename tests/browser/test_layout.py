@@ -73,12 +73,10 @@ def test_everything_can_be_clicked(open_at: Callable[..., Hmi]) -> None:
         show(hmi, "Map")
         has_tabs = hmi.page.locator(".pane-tabs").is_visible()
         expect(hmi.test_id("health-strip")).to_be_visible(visible=has_tabs)
-        for mode in ("Ideal", "Value", "Fixed"):
+        for mode in ("Ideal", "Value"):
             hmi.open_details()
             hmi.page.get_by_role("radio", name=mode).check()
             hmi.open_details(False)
-            if mode == "Value":
-                continue  # "Fixed" has everything that it has
             # Lower than this, a greenhouse of ten metres is the size of a stamp.
             least = 120 if size in LOW else 200
             tall = "([map, least]) => map.clientHeight >= least"
@@ -194,7 +192,7 @@ def test_a_small_laptop_has_status_map_and_table_at_first_glance(
         expect(hmi.row(tag_id)).to_be_in_viewport(ratio=1)
 
 
-def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
+def test_a_phone_has_room_for_the_facts_and_missing_data(
     open_at: Callable[..., Hmi],
 ) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]))
@@ -207,7 +205,6 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
     # Over the map, whose height stays.
     assert place(facts).bottom <= place(legend).top
     hmi.turn("sensor=soil_moisture&colour=value")
-    hmi.page.get_by_role("radio", name="Fixed").check()
     hmi.turn("sensor=radiation")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
     notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")

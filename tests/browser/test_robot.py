@@ -115,7 +115,7 @@ def test_the_robot_and_its_trail_plan_and_battery_are_shown_in_the_live_view(
     hmi.page.emulate_media(media="print")
     expect(trail).to_be_hidden()
     hmi.page.emulate_media(media="screen")
-    expect(layer.locator(".robot-plan")).to_have_attribute("points", "3.2,1.6 3.2,3")
+    expect(layer.locator(".robot-plan")).to_have_attribute("points", "3.2,1 3.2,3")
     assert violations(hmi) == []
 
     # It can be switched off, also for others who open the link.

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Download, Page, ViewportSize, expect
 
 from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import FONTS, PHONE, Hmi, OpenPage, changed_box
-from tests.browser.places import LINES, place, places
+from tests.browser.places import place, places
 from tests.support.messages import inspection, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -32,24 +32,6 @@ def save(hmi: Hmi, name: str) -> Download:
 
 
 FOOTER_PX = 56
-
-
-def is_red(pixel: object) -> bool:
-    assert isinstance(pixel, tuple)
-    red, green, blue = pixel
-    return bool(red > green + 30 and red > blue + 30)
-
-
-def longest_dark_run(picture: Image.Image) -> int:
-    """The longest horizontal line of dark pixels in the right half, pixels."""
-    dark = picture.convert("L").point(lambda value: 255 if value < 90 else 0)
-    longest = 0
-    for y in range(dark.height):
-        run = 0
-        for x in range(dark.width // 2, dark.width):
-            run = run + 1 if dark.getpixel((x, y)) else 0
-            longest = max(longest, run)
-    return longest
 
 
 def is_on_the_screen(hmi: Hmi, part: Image.Image, at: tuple[int, int], ratio: int) -> bool:
@@ -84,23 +66,8 @@ def test_the_map_as_png_equals_the_screen(greenhouse: Bridge, open_page: OpenPag
         hmi.expect(partial(is_on_the_screen, hmi, saved, (x0, y0), ratio), "what was saved")
         assert len(saved.getcolors(1 << 20) or []) > 50
         footer = picture.crop((0, picture.height - FOOTER_PX * ratio, *picture.size))
-        # The ramp's upper half ends in temperature's full red, a legend of values above.
-        reds = [rgb for _, rgb in footer.getcolors(1 << 20) or [] if is_red(rgb)]
-        assert len(reds) > 20
-        # The scale bar, of a round length.
-        length = longest_dark_run(footer) / ratio / view.scale
-        assert min(abs(length - metres) for metres in (0.5, 1, 2)) < 3 / view.scale
-
-
-def test_copying_the_link_works_or_says_where_it_is(
-    greenhouse: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(greenhouse.url, "sensor=co2", permissions=["clipboard-read", "clipboard-write"])
-    hmi.expect_rows(*TAGS)
-    hmi.page.get_by_role("button", name="Menu").click()
-    hmi.page.get_by_role("button", name="Copy link").click()
-    expect(hmi.page.locator(".toast")).to_have_text("Link copied")
-    assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{greenhouse.url}/#sensor=co2"
+        # Its words: what the colours show, and of when.
+        assert len(footer.getcolors(1 << 20) or []) > 5
 
 
 def luminance(pixel: object) -> float:
@@ -295,8 +262,6 @@ def test_on_a_dark_phone_it_is_light_and_only_a_wide_table_scrolls(
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         left = [place(it).left for it in page.locator("dt").all()]
         assert left[0] == left[2] < left[1] == left[3], "two in a row"
-        limits = page.locator("table.alarms td", has_text=re.compile(r"\d\sto\s.*%"))
-        assert limits.evaluate_all(f"all => all.map({LINES})") == [1]
         colour = page.locator("body").evaluate("it => getComputedStyle(it).backgroundColor")
         assert colour == "rgb(255, 255, 255)"
 

@@ -56,7 +56,7 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
         return [box.bottom - box.top for box in places(phone, *selectors)]
 
     assert sum(heights(".health-strip", ".map-frame", ".legend")) >= tall
-    # The counts by status; and what to do first says since when, beside how many more there are.
+    # The numbers of tags by status, and what to do first: since when, beside how many more.
     counts = phone.page.locator(".strip-counts li")
     expect(counts).to_have_text(["Critical 1", "Stressed 1", "Unknown 2", "Healthy 3"])
     expect(counts.last).to_be_in_viewport(ratio=1)
@@ -80,7 +80,7 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     assert frame >= 200
     assert frame + card >= tall
     # The legend leaves its title to the sensor above the map, but not the way out of a comparison.
-    phone.turn("compare=-600")
+    phone.turn("compare=day")
     expect(phone.page.get_by_role("button", name="Stop comparing")).to_be_in_viewport(ratio=1)
     # Both on one line: the comparison takes as little of the map as it can.
 
@@ -157,7 +157,6 @@ def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phon
         show(phone, pane)
         assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     phone.colour_by_value()
-    phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
         show(phone, pane)
         # WCAG 2.2, 2.5.5, as phones recommend; a text link among them is as high.

@@ -29,15 +29,13 @@ class Viewer:
         self.connection.send(json.dumps(members))
 
     def next(self) -> TwinUpdate | tuple[int, int, bytes]:
-        """The next message: JSON, or (subscription or -1 for a time, ns, payload)."""
+        """The next message: JSON, or (subscription, ns, payload)."""
         message = self.connection.recv(timeout=PATIENCE_S)
         if isinstance(message, str):
             reported: TwinUpdate = json.loads(message)
             if reported["op"] == "advertise":
                 self.channels |= {channel["topic"]: channel for channel in reported["channels"]}
             return reported
-        if message[0] == 2:
-            return -1, struct.unpack_from("<Q", message, 1)[0], b""
         key, stamp_ns = struct.unpack_from("<IQ", message, 1)
         return key, stamp_ns, message[13:]
 

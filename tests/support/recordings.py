@@ -29,7 +29,6 @@ def write_bag(
     path: Path,
     sent: Iterable[Sent],
     *,
-    encoding: str = "cdr",
     compression: CompressionType = CompressionType.ZSTD,
     is_chunked: bool = True,
     is_finished: bool = True,
@@ -42,7 +41,7 @@ def write_bag(
         for topic, at_s, message in sent:
             if topic not in channels:
                 schema = writer.register_schema(type_of(message), "ros2msg", b"")
-                channels[topic] = writer.register_channel(topic, encoding, schema)
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
             at_ns = round(at_s * 1e9)
             writer.add_message(channels[topic], at_ns, serialize_message(message), at_ns)
         if is_finished:

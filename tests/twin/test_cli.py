@@ -83,6 +83,7 @@ def test_an_argument_that_is_not_for_ros_is_refused_and_help_starts_no_twin(doma
         (["--params-file", "/nonexistent.yaml"], "/nonexistent.yaml"),
         (["-p", "use_sim_time:=5"], "parameter use_sim_time is not a bool"),
         (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0"),
+        (["-p", "layers:=['soil moisture']"], "parameter layers is 'soil moisture'"),
     ],
 )
 def test_impossible_arguments_are_refused_in_one_line(

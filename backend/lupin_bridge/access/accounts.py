@@ -251,13 +251,10 @@ class Accounts:
 
     # --- sessions -----------------------------------------------------------------------------
 
-    def begin_session(
-        self, person: Person, address: str, now_s: int, *, ends_others: bool = False
-    ) -> str | None:
+    def begin_session(self, person: Person, address: str, now_s: int) -> str | None:
         """Begin a session of an account or token; returns its cookie.
 
-        None: it was removed meanwhile, or has another secret. `ends_others`: end the other sessions
-        of that name.
+        None: it was removed meanwhile, or has another secret.
 
         Raises:
             AccountError: the file cannot be written.
@@ -274,14 +271,11 @@ class Accounts:
             connection.execute(
                 "DELETE FROM session WHERE id IN (SELECT id FROM session WHERE name = ?"
                 " ORDER BY ends_at_s DESC LIMIT -1 OFFSET ?)",
-                (name, 0 if ends_others else _MAX_SESSIONS - 1),
+                (name, _MAX_SESSIONS - 1),
             )
-            if ends_others:
-                connection.execute("DELETE FROM device WHERE name = ?", (name,))
             row = (digest(cookie), name, now_s + SESSION_S)
             connection.execute("INSERT INTO session VALUES (?, ?, ?)", row)
-            subject = "and out everywhere else" if ends_others else ""
-            _audit(connection, Audited(now_s, name, "sign in", subject, address))
+            _audit(connection, Audited(now_s, name, "sign in", "", address))
         return cookie
 
     def end_session(self, person: Person, address: str, now_s: int) -> None:

@@ -84,7 +84,6 @@ class People:
 
         Raises:
             AccountError: the file cannot be read.
-            CookieTooLong: there are too many.
 
         """
         headers, now_s = tuple(headers), time.time()
@@ -185,9 +184,7 @@ class People:
         kept = known.secret if known else ""
         return known if await self._on_thread(lambda: verify(kept, password)) else None
 
-    async def sign_in(
-        self, person: Person, address: str, *, ends_others: bool = False
-    ) -> tuple[str, str, int] | None:
+    async def sign_in(self, person: Person, address: str) -> tuple[str, str, int] | None:
         """Begin a session; returns its cookie's name and value, and how long it lasts, s.
 
         None: the account was removed while its password was checked, or has another one now.
@@ -200,9 +197,7 @@ class People:
         if self.shared is not None and person.by == "shared token":
             return self.shared.cookie_name, self.shared.cookie(time.time()), SHARED_SESSION_S
         self._sign_ins.charge(person.name, time.monotonic(), f"signed in {_MOST}")
-        cookie = await self.write(
-            lambda it, now_s: it.begin_session(person, address, now_s, ends_others=ends_others)
-        )
+        cookie = await self.write(lambda it, now_s: it.begin_session(person, address, now_s))
         return None if cookie is None else (self._cookie_name(), cookie, SESSION_S)
 
     async def sign_out(self, person: Person, address: str) -> str:

@@ -1,10 +1,8 @@
 """The access policy: which proxies are believed, and which hosts and origins are allowed.
 
 Anybody may send X-Forwarded-For and X-Forwarded-Proto, so they are believed only from a proxy that
-the operator has named. They replace `client` and `scheme` of the scope, and so count for limits,
-logs, wrong tokens and the check of origins. The middleware of uvicorn takes an address with a port,
-as some proxies write it, for a new client each time. It also knows no IPv4 address on a socket that
-listens for IPv6, and reads only the last of several lines.
+the operator has named. uvicorn's middleware then sets `client` and `scheme` of the scope by them,
+which count for limits, logs, wrong tokens and the check of origins.
 
 A browser sends any page's requests to a bridge that its machine can reach. Four rules keep foreign
 pages from reading anything through it, or making it compute:
@@ -31,20 +29,19 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
-from typing import Final, Self
+from typing import Any, Final, Self
 
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from lupin_bridge.settings import SettingError, Settings, unix_path
+from lupin_bridge.settings import UNIX, SettingError, Settings, unix_path
 
 # RFC 3986: a path of plain segments, none of which is "." or "..", without a slash at its end.
 _PATH_PREFIX: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 _HEADER: Final = re.compile(r"[A-Za-z][A-Za-z0-9-]{0,63}")
 # Key in a request's state: whom a trusted proxy names.
 PROXY_USER_KEY: Final = "proxy_user"
-# "10.0.0.7:1234" and "[fd00::7]:1234", as some proxies write an address.
-_WITH_PORT: Final = re.compile(r"\[(?P<v6>[^\]]+)\](?::\d+)?|(?P<v4>[\d.]+):\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,27 +87,17 @@ class Proxies:
         proxies = tuple(_network(text, called) for text in settings.trusted_proxy)
         return cls(proxies, has_unix_socket, prefix, header)
 
-    def trusts(self, address: str) -> bool:
+    @property
+    def trusted(self) -> list[str]:
+        """The proxies as uvicorn's middleware takes them."""
+        return [*map(str, self.proxies), *([UNIX] if self.has_unix_socket else [])]
+
+    def trusts(self, peer: str) -> bool:
         """Whether this is a proxy whose headers count."""
-        if not address:  # only the peer of a Unix socket has none
-            return self.has_unix_socket
-        ip = _address(address)
-        return ip is not None and any(ip in network for network in self.proxies)
-
-    def client(self, peer: str, forwarded_for: Iterable[str]) -> str:
-        """The client, by X-Forwarded-For in lines: the nearest address that is no trusted proxy.
-
-        Each proxy appends its peer at the right; what is left of the first untrusted address is
-        only a claim of that client. An invalid address ends the search.
-        """
-        client = peer
-        hops = [hop for line in forwarded_for for hop in line.split(",")]
-        while hops and self.trusts(client):
-            hop = _address(hops.pop())
-            if hop is None:
-                break
-            client = str(hop)
-        return client
+        ip = _address(peer)
+        if ip is None:
+            return self.has_unix_socket and peer == UNIX
+        return any(ip in network for network in self.proxies)
 
 
 class BehindProxies:
@@ -121,27 +108,19 @@ class BehindProxies:
     """
 
     def __init__(self, app: ASGIApp, proxies: Proxies) -> None:
-        self._app = app
+        self._app: Any = ProxyHeadersMiddleware(app, proxies.trusted)  # type: ignore[arg-type]
         self._proxies = proxies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on with its client, scheme, user and path."""
         if scope["type"] in ("http", "websocket"):
-            is_trusted = self._proxies.trusts((scope.get("client") or ("", 0))[0])
-            forwarded = {**self._forwarded(scope), **self._user(scope)} if is_trusted else {}
-            scope = {**scope, **forwarded, **self._path(scope)}
+            # Only the peer of a Unix socket has no address. Others may have an IPv4 one in the
+            # spelling of a socket that listens for IPv6.
+            peer = (scope.get("client") or ("", 0))[0]
+            peer = str(_address(peer) or peer) or UNIX
+            user = self._user(scope) if self._proxies.trusts(peer) else {}
+            scope = {**scope, "client": (peer, 0), **user, **self._path(scope)}
         await self._app(scope, receive, send)
-
-    def _forwarded(self, scope: Scope) -> dict[str, object]:
-        peer, headers = (scope.get("client") or ("", 0))[0], Headers(scope=scope)
-        client = self._proxies.client(peer, headers.getlist("x-forwarded-for"))
-        forwarded: dict[str, object] = {"client": (client, 0)}
-        # Of several, the last: it is from the nearest proxy, which is the one that we trust.
-        proto = ",".join(headers.getlist("x-forwarded-proto")).rpartition(",")[2].strip().lower()
-        if proto in ("http", "https"):
-            is_socket = scope["type"] == "websocket"
-            forwarded["scheme"] = proto.replace("http", "ws") if is_socket else proto
-        return forwarded
 
     def _user(self, scope: Scope) -> dict[str, object]:
         """Whom the proxy names, for the state: nothing else reads the header."""
@@ -179,12 +158,8 @@ def _network(text: str, called: str) -> IPv4Network | IPv6Network:
 
 
 def _address(text: str) -> IPv4Address | IPv6Address | None:
-    text = text.strip()
-    match = _WITH_PORT.fullmatch(text)
-    if match is not None:
-        text = match["v6"] or match["v4"]
     try:
-        ip = ip_address(text.partition("%")[0])
+        ip = ip_address(text.strip().partition("%")[0])
     except ValueError:
         return None
     return ip.ipv4_mapped or ip if isinstance(ip, IPv6Address) else ip

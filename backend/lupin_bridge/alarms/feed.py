@@ -63,9 +63,8 @@ log = logging.getLogger(__name__)
 # Writes per lot: some tens of milliseconds of a worker.
 LOT: Final = 500
 LOT_S: Final = 0.05
-# After this long, an observation is in the journal; it is read once more later, for a slow disk.
+# After this long, an observation is in the journal. A slow disk is read when it has written more.
 JOURNAL_S: Final = 0.15
-AGAIN_S: Final = 1.5
 # Pause after each reading: a robot that scans all the time is followed once a second.
 REST_S: Final = 0.85
 RETRY_S: Final = 5.0
@@ -209,14 +208,9 @@ class AlarmFeed:
             else:
                 if not isinstance(error, _UNREADABLE):
                     self._begin(self._alarm_source)
-                self._ask_again(RETRY_S)
+                self._again = loop.call_later(RETRY_S, self._wake.set)
                 await publishing.run(self._publish_silence(loop.time() - answered_s))
             await asyncio.sleep(REST_S)
-
-    def _ask_again(self, wait_s: float) -> None:
-        if self._again is not None:
-            self._again.cancel()
-        self._again = asyncio.get_running_loop().call_later(wait_s, self._wake.set)
 
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
@@ -227,7 +221,7 @@ class AlarmFeed:
 
     async def _follow(self) -> None:
         alarm_log = self._log
-        had, is_all = alarm_log.last, False
+        is_all = False
         while not is_all:
             past = await self._source.writes(alarm_log.request(LOT))
             if alarm_log is not self._log:
@@ -240,8 +234,6 @@ class AlarmFeed:
                 self.judge.note_writes(past.of_newest_run)
             self._is_caught_up &= was_caught_up
         await self._publish()
-        if alarm_log.last != had:
-            self._ask_again(AGAIN_S)
 
     async def _take(self, past: PastWrites) -> bool:
         """Take writes; returns whether nothing more is to be read."""

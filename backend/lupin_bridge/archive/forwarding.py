@@ -395,8 +395,6 @@ class Forwarding:
                 ended = f"has ended with code {await process.wait()}"
             except OSError as error:
                 ended = f"cannot be started: {error}"
-            except ValueError as error:
-                ended = f"writes a line without an end: {error}"
             finally:
                 if process is not None and process.returncode is None:
                     process.kill()

@@ -10,13 +10,11 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, islice
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from threading import Event
-from typing import Any, Final
+from typing import Final
 
-import rclpy
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
@@ -24,7 +22,7 @@ from rosgraph_msgs.msg import Clock
 from lupin_bridge.bags.recording import INPUTS, Recorded, Recording, RecordingError
 from lupin_bridge.console import say
 from lupin_twin.adapt.messages import message_type
-from lupin_twin.core.interfaces import CLOCK, MAP, STATE
+from lupin_twin.core.interfaces import CLOCK, STATE
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.ros.base_node import qos_of, running_ros
 from lupin_twin.ros.convert import nanoseconds, time_msg
@@ -41,13 +39,9 @@ _MAX_A_BEAT: Final = 2
 _LAG_S: Final = 0.1
 # Longest step of time: after the machine stood still, the recording goes on where it was.
 _MAX_STEP_S: Final = 0.25
-# Longer silences than this, s of waiting, are announced.
-_LONG_S: Final = 60.0
 # Longest wait for the twin: discovery by DDS takes up to 3 s, and longer on a busy machine.
 _TWIN_S: Final = 30.0
 _POLL_S: Final = 1.0
-# Before a loop begins again, DDS delivers what was published.
-_DELIVERY_S: Final = 0.5
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -58,14 +52,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     process.block()
     stop = process.stop_flag()
     try:
-        with Recording(options.files) as recording:
-            recording.check_start(options.start)
-            with running_ros(ros_args):
-                node = PlayerNode(recording.inputs)
-                try:
-                    _play(recording, node, options, stop)
-                finally:
-                    node.destroy_node()
+        with Recording(options.recording) as recording, running_ros(ros_args):
+            node = PlayerNode(recording.inputs)
+            try:
+                _play(recording, node, options.speed, stop)
+            finally:
+                node.destroy_node()
     except (RecordingError, ParameterError) as error:
         say(str(error))
         return 1
@@ -75,11 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def parser() -> argparse.ArgumentParser:
     """The options; `lupin-twin demo` has checked them."""
     made = argparse.ArgumentParser(prog=f"python -m {__spec__.name}", allow_abbrev=False)
-    made.add_argument("files", metavar="FILE.mcap", type=Path, nargs="+")
+    made.add_argument("recording", metavar="FILE.mcap", type=Path)
     made.add_argument("--speed", type=float, default=1.0)
-    made.add_argument("--start", type=float, default=0.0)
-    made.add_argument("--loop", action="store_true")
-    made.add_argument("--skip-gaps", type=float, default=math.inf)
     return made
 
 
@@ -88,19 +77,11 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def __init__(self, inputs: Mapping[str, str]) -> None:
         super().__init__(NODE_NAME)
-        self._inputs = inputs
         self._clock = self.create_publisher(Clock, CLOCK.name, 1)
-        self._publishers_by_topic: dict[str, Any] = {}
-        self.advertise()
-
-    def advertise(self) -> None:
-        """Make new publishers: a late subscriber must get nothing of an earlier loop."""
-        for publisher in self._publishers_by_topic.values():
-            self.destroy_publisher(publisher)
-        for topic, kind in self._inputs.items():
-            self._publishers_by_topic[topic] = self.create_publisher(
-                message_type(kind), topic, qos_of(INPUTS[kind])
-            )
+        self._publishers_by_topic = {
+            topic: self.create_publisher(message_type(kind), topic, qos_of(INPUTS[kind]))
+            for topic, kind in inputs.items()
+        }
 
     def publish_time(self, now_ns: int) -> None:
         """Publish `/clock`."""
@@ -109,11 +90,6 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def publish(self, message: Recorded) -> None:
         """Publish a serialised message as it is."""
         self._publishers_by_topic[message.topic].publish(message.data)
-
-    def deliver(self) -> None:
-        """Wait until the twin has what was published, within bounds."""
-        for publisher in self._publishers_by_topic.values():
-            publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=_DELIVERY_S))
 
     @property
     def has_subscribers(self) -> bool:
@@ -142,43 +118,20 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 class Player:
-    """Decides what is due at each moment. Time is an argument of `beat`; `node` publishes.
+    """Decides what is due at each moment. Time is an argument of `beat`; `node` publishes."""
 
-    Messages from before the start are published first: all of them, but only the last of each map.
-    """
-
-    def __init__(self, recording: Recording, node: PlayerNode, options: argparse.Namespace) -> None:
+    def __init__(self, recording: Recording, node: PlayerNode, speed: float) -> None:
         self._recording = recording
         self._node = node
-        self._speed: float = options.speed
-        self._skip_ns = options.skip_gaps * 1e9
-        self._start_ns = recording.start_ns + round((options.start) * 1e9)
-        self._end_ns = recording.end_ns + round(_LAG_S * self._speed * 1e9)
+        self._speed = speed
+        self._lag_ns = round(_LAG_S * speed * 1e9)
+        self._end_ns = recording.end_ns + self._lag_ns
         self.published = 0
-        self.begin()
-
-    def begin(self) -> None:
-        """Begin, or begin again."""
-        recording, inputs = self._recording, self._recording.inputs
-        self._position_ns = self._start_ns
-        self._time_ns: int | None = None if recording.has_clock else self._start_ns
-        if recording.has_clock:
-            newest = recording.messages([CLOCK.name], before_ns=self._start_ns, newest_first=True)
-            for message in islice(newest, 1):
-                self._time_ns = _clock_ns(message)
-        self._earlier: Iterator[Recorded] = iter(())
-        if self._start_ns > recording.start_ns:
-            maps = [topic for topic, kind in inputs.items() if kind == MAP.type_name]
-            last = [
-                recording.messages([topic], before_ns=self._start_ns, newest_first=True)
-                for topic in maps
-            ]
-            rest = recording.messages(inputs.keys() - {*maps}, before_ns=self._start_ns)
-            self._earlier = chain(*(islice(of_map, 1) for of_map in last), rest)
-        topics = [*inputs, *([CLOCK.name] if recording.has_clock else [])]
-        self._rest = recording.messages(topics, from_ns=self._start_ns)
+        self._position_ns = recording.start_ns
+        self._time_ns = None if recording.has_clock else recording.start_ns
+        topics = [*recording.inputs, *([CLOCK.name] if recording.has_clock else [])]
+        self._rest = recording.messages(topics)
         self._next = next(self._rest, None)
-        self._noted_ns = -1
         self._last_s: float | None = None
 
     @property
@@ -194,50 +147,27 @@ class Player:
 
         """
         left = _MAX_A_BEAT
-        for earlier in islice(self._earlier, left):
-            self._publish(earlier)
-            left -= 1
-        if not left:
-            self._publish_time()
-            return
         step_s = 0.0 if self._last_s is None else min(now_s - self._last_s, _MAX_STEP_S)
         self._last_s = now_s
-        self._move(round(step_s * self._speed * 1e9))
-        lag_ns = round(_LAG_S * self._speed * 1e9)
+        self._position_ns = min(self._position_ns + round(step_s * self._speed * 1e9), self._end_ns)
+        if not self._recording.has_clock:
+            self._time_ns = min(self._position_ns, self._recording.end_ns)
         while (message := self._next) is not None:
             is_clock = message.topic == CLOCK.name
-            if message.log_ns > self._position_ns - (0 if is_clock else lag_ns):
+            if message.log_ns > self._position_ns - (0 if is_clock else self._lag_ns):
                 break
             if is_clock:
                 self._time_ns = _clock_ns(message) or self._time_ns
             elif left:
                 left -= 1
-                self._publish(message)
+                self._node.publish(message)
+                self.published += 1
             else:
                 # Time waits for messages that are due: the twin must be able to take them.
-                self._position_ns = message.log_ns + lag_ns
+                self._position_ns = message.log_ns + self._lag_ns
                 break
             self._next = next(self._rest, None)
         self._publish_time()
-
-    def _move(self, step_ns: int) -> None:
-        self._position_ns = min(self._position_ns + step_ns, self._end_ns)
-        if self._next is not None:
-            silence_ns = self._next.log_ns - self._position_ns
-            if silence_ns > self._skip_ns:
-                self._position_ns = self._next.log_ns
-            elif silence_ns > _LONG_S * self._speed * 1e9 and self._noted_ns != self._next.log_ns:
-                self._noted_ns = self._next.log_ns
-                say(
-                    f"the recording is silent for {silence_ns / 1e9:,.0f} s: "
-                    "--skip-gaps SECONDS jumps over that"
-                )
-        if not self._recording.has_clock:
-            self._time_ns = min(self._position_ns, self._recording.end_ns)
-
-    def _publish(self, message: Recorded) -> None:
-        self._node.publish(message)
-        self.published += 1
 
     def _publish_time(self) -> None:
         if self._time_ns is not None:
@@ -248,19 +178,14 @@ def _clock_ns(message: Recorded) -> int:
     return nanoseconds(deserialize_message(message.data, Clock).clock)
 
 
-def _play(
-    recording: Recording,
-    node: PlayerNode,
-    options: argparse.Namespace,
-    stop: Event,
-) -> None:
+def _play(recording: Recording, node: PlayerNode, speed: float, stop: Event) -> None:
     until_s = time.monotonic() + _TWIN_S
     while not node.has_subscribers and not stop.is_set():
         if time.monotonic() > until_s:
             raise RecordingError(f"no twin has subscribed within {_TWIN_S:g} s")
         stop.wait(_BEAT_S)
-    say(f"playing {recording.name}")
-    player = Player(recording, node, options)
+    say(f"playing {recording.path}")
+    player = Player(recording, node, speed)
     is_announced = False
     looked_s = -math.inf
     while not stop.is_set():
@@ -269,11 +194,7 @@ def _play(
             looked_s = now_s
             node.check_alone()
         player.beat(now_s)
-        if player.is_over and options.loop:
-            node.deliver()
-            node.advertise()
-            player.begin()
-        elif player.is_over and not is_announced:
+        if player.is_over and not is_announced:
             is_announced = True
             say(f"the end: {player.published:,} messages were published")
         stop.wait(_BEAT_S)

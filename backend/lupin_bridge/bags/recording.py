@@ -1,4 +1,4 @@
-"""Reads recordings as `ros2 bag record -s mcap` writes them: files and folders, as one. No ROS.
+"""Reads a recording as `ros2 bag record -s mcap` writes it: a file, or a folder of them. No ROS.
 
 The `mcap` library reads them, a chunk at a time; what it cannot read, the `mcap` tool can repair.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import heapq
 import struct
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from operator import attrgetter
@@ -43,30 +43,30 @@ class Recorded:
 
 
 class Recording:
-    """Files, and the `.mcap` files of folders, as one recording; a context manager.
+    """A file, or the `.mcap` files of a folder as one recording; a context manager.
 
     `topics` gives each topic's type; `start_ns` and `end_ns` are when the first and the last
     message were recorded.
 
     Raises:
-        RecordingError: one of them cannot be read, or none has messages.
+        RecordingError: a file cannot be read, or none has messages.
 
     """
 
-    def __init__(self, named: Sequence[Path]) -> None:
-        self.name = str(named[0]) if len(named) == 1 else f"{named[0]} and {len(named) - 1} more"
+    def __init__(self, path: Path) -> None:
+        self.path = path
         self.topics: dict[str, str] = {}
         self._readers: list[tuple[Path, SeekingReader]] = []
         spans: list[tuple[int, int]] = []
         with ExitStack() as files:
-            for path in _files(named):
-                file = files.enter_context(_opened(path))
-                reader, statistics = self._learn(path, file)
+            for part in _files(path):
+                file = files.enter_context(_opened(part))
+                reader, statistics = self._learn(part, file)
                 if statistics.message_count:
-                    self._readers.append((path, reader))
+                    self._readers.append((part, reader))
                     spans.append((statistics.message_start_time, statistics.message_end_time))
             if not spans:
-                raise RecordingError(f"{self.name} has no messages")
+                raise RecordingError(f"{self.path} has no messages")
             self._files = files.pop_all()
         self.start_ns = min(start for start, _ in spans)
         self.end_ns = max(end for _, end in spans)
@@ -99,63 +99,21 @@ class Recording:
         if all(kind == MAP.type_name for kind in chosen.values()):
             there = ", ".join(f"{name} ({kind})" for name, kind in list(self.topics.items())[:20])
             raise RecordingError(
-                f"{self.name} has nothing that a twin subscribes to: expected a topic of "
+                f"{self.path} has nothing that a twin subscribes to: expected a topic of "
                 f"{OBSERVATIONS.type_name} or {DISCOVERED_TAGS.type_name}, "
                 f"it has {there or 'no topics'}"
             )
         return chosen
 
-    def check_start(self, start_s: float) -> None:
-        """Refuse a start after the end.
-
-        Raises:
-            RecordingError: it is after the end.
-
-        """
-        duration_s = (self.end_ns - self.start_ns) / 1e9
-        if start_s > duration_s:
-            raise RecordingError(
-                f"--start is {start_s:g} s, and {self.name} has {duration_s:.1f} s"
-            )
-
-    def messages(
-        self,
-        topics: Collection[str],
-        *,
-        from_ns: int | None = None,
-        before_ns: int | None = None,
-        newest_first: bool = False,
-    ) -> Iterator[Recorded]:
-        """The messages of these topics, `from_ns` <= time < `before_ns`, in the order of time.
+    def messages(self, topics: Collection[str]) -> Iterator[Recorded]:
+        """The messages of these topics, in the order of time.
 
         Raises:
             RecordingError: a file is damaged from there on.
 
         """
-        parts = (
-            self._messages_of(path, reader, topics, (from_ns, before_ns), newest_first)
-            for path, reader in self._readers
-        )
-        return heapq.merge(*parts, key=attrgetter("log_ns"), reverse=newest_first)
-
-    def _messages_of(
-        self,
-        path: Path,
-        reader: SeekingReader,
-        topics: Collection[str],
-        period: tuple[int | None, int | None],
-        newest_first: bool,
-    ) -> Iterator[Recorded]:
-        try:
-            for _, channel, message in reader.iter_messages(
-                list(topics),
-                starting_at=period[0],
-                ending_before=period[1],
-                reverse=newest_first,
-            ):
-                yield Recorded(channel.topic, message.log_time, message.data)
-        except _DAMAGE as error:
-            raise _broken(path, str(error) or type(error).__name__) from error
+        parts = (_messages_of(path, reader, topics) for path, reader in self._readers)
+        return heapq.merge(*parts, key=attrgetter("log_ns"))
 
     def _learn(self, path: Path, file: IO[bytes]) -> tuple[SeekingReader, Statistics]:
         try:
@@ -169,36 +127,30 @@ class Recording:
         for channel in summary.channels.values():
             schema = summary.schemas.get(channel.schema_id)
             kind = "" if schema is None else schema.name
-            if kind in INPUTS and channel.message_encoding != MESSAGE_ENCODING:
-                raise RecordingError(
-                    f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}, must be "
-                    f"{MESSAGE_ENCODING!r}, which is what ROS 2 publishes"
-                )
-            if self.topics.setdefault(channel.topic, kind) != kind:
-                raise RecordingError(
-                    f"{path} has {channel.topic} as {kind}, a file before it as "
-                    f"{self.topics[channel.topic]}: they are not parts of one recording"
-                )
+            self.topics.setdefault(channel.topic, kind)
         return reader, summary.statistics
 
 
-def _files(named: Sequence[Path]) -> list[Path]:
-    files: list[Path] = []
-    for path in named:
-        try:
-            inside = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
-        except OSError as error:
-            raise RecordingError(f"cannot read {path}: {error.strerror}") from error
-        if not inside:
-            raise RecordingError(f"{path} is a folder without a {SUFFIX} file")
-        files += inside
+def _messages_of(path: Path, reader: SeekingReader, topics: Collection[str]) -> Iterator[Recorded]:
+    try:
+        for _, channel, message in reader.iter_messages(list(topics)):
+            yield Recorded(channel.topic, message.log_time, message.data)
+    except _DAMAGE as error:
+        raise _broken(path, str(error) or type(error).__name__) from error
+
+
+def _files(path: Path) -> list[Path]:
+    try:
+        files = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
+    except OSError as error:
+        raise RecordingError(f"cannot read {path}: {error.strerror}") from error
+    if not files:
+        raise RecordingError(f"{path} is a folder without a {SUFFIX} file")
     return files
 
 
 def _opened(path: Path) -> IO[bytes]:
     try:
-        if not path.is_file() and path.exists():  # a pipe would be waited for
-            raise RecordingError(f"{path} is not a file")
         return path.open("rb")
     except OSError as error:
         raise RecordingError(f"cannot read {path}: {error.strerror}") from error

@@ -8,9 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-import math
 import os
-import re
 import signal
 import sys
 import tempfile
@@ -30,7 +28,6 @@ from lupin_bridge.settings import (
     SettingError,
     Settings,
     limits_of,
-    meant,
     option,
     settings_from,
     strange_variables,
@@ -46,15 +43,9 @@ from lupin_twin.runtime.process import (
     split_ros_args,
 )
 
-# How often a message may repeat at once, and the period of each further one.
-AT_ONCE: Final = 20
-PERIOD_S: Final = 5.0
-# The same limits for all messages of one logger.
-LOGGER_AT_ONCE: Final = 200
-LOGGER_PERIOD_S: Final = 0.2
-MAX_KINDS: Final = 1_000
-
-_NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
+# How many messages of a level one logger may write at once, and the period of each further one.
+AT_ONCE: Final = 50
+PERIOD_S: Final = 1.0
 
 # uvicorn's message, whose trace is of no use: a client sent the bytes.
 _NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
@@ -77,27 +68,21 @@ class JsonFormatter(logging.Formatter):
 
 
 class OnceInAWhile(logging.Filter):
-    """Limits the rate of records of each kind, and of all records of one logger.
+    """Limits the rate of records of one logger and level.
 
-    Any client can cause some of them as often as it likes, which would soon fill a disk. A kind is
-    the first line of a message, without its numbers (addresses, sizes, ids).
+    Any client can cause some of them as often as it likes, which would soon fill a disk.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._kinds = RateLimit(1.0 / PERIOD_S, AT_ONCE, MAX_KINDS)
-        self._loggers = RateLimit(1.0 / LOGGER_PERIOD_S, LOGGER_AT_ONCE, MAX_KINDS)
+        self._rate = RateLimit(1.0 / PERIOD_S, AT_ONCE)
         self._held_back: Counter[Hashable] = Counter()
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether to write the record; adds to it how many were held back before."""
-        now_s = time.monotonic()
-        text = record.getMessage() if record.msg == "%s" else str(record.msg)
-        error = record.exc_info[0] if record.exc_info else None
-        kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
-        if self._kinds.take(kind, now_s) or self._loggers.take(record.name, now_s):
-            if len(self._held_back) < MAX_KINDS:
-                self._held_back[kind] += 1
+        kind = record.name, record.levelno
+        if self._rate.take(kind, time.monotonic()):
+            self._held_back[kind] += 1
             return False
         held_back = self._held_back.pop(kind, 0)
         if record.msg == _NO_TEXT:
@@ -155,9 +140,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options, unknown = parser().parse_known_args(own)
     if unknown:
         name = unknown[0].partition("=")[0]
-        known = map(option, vars(options).keys() - {"role"}) if options.role in ROLES else ()
         is_of_ros = name in {*_RULES, "--params-file"}
-        remedy = ": put it after --ros-args" if is_of_ros else meant(name, known)
+        remedy = ": put it after --ros-args" if is_of_ros else ""
         _fail(f"{name} is not an option of {options.role}{remedy}")
     if options.role == "adapt":
         return adapt.run(options, ros_args)
@@ -189,7 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             secrets,
             ros_args,
             feed_args,
-            recording=getattr(options, "recording", None) or [],
+            recording=getattr(options, "recording", None),
         )
     except SettingError as error:
         _fail(str(error))
@@ -222,12 +206,8 @@ def _feed_args(options: argparse.Namespace) -> list[str]:
     """The arguments of what feeds a demo: of the patrol, or with `--from`, of the player."""
     if options.role != "demo":
         return []
-    given = [f"--start={options.start}"] if options.start is not None else []
-    given += ["--loop"] if options.loop else []
-    given += [f"--skip-gaps={options.skip_gaps}"] if options.skip_gaps < math.inf else []
+    given = []
     is_patrol = options.recording is None
-    if is_patrol and given:
-        _fail(f"{given[0].partition('=')[0]} is for --from FILE.mcap")
     if not is_patrol and options.seed is not None:
         _fail("--seed is for the patrol, which --from FILE.mcap replaces")
     speeds = PATROL_SPEEDS if is_patrol else PLAYER_SPEEDS
@@ -265,15 +245,16 @@ def parser() -> argparse.ArgumentParser:
         arguments = common.add_argument_group(group)
         for spec in table():
             if spec.metadata["group"] == group:
-                limits = limits_of(spec.name)
+                limits, text = limits_of(spec.name), spec.metadata["help"]
+                nothing = "empty" if "empty:" in text else "none"
                 arguments.add_argument(
                     option(spec.name),
                     action="append" if spec.default == () else "store",
                     # None: not given here, so the environment or the file decides.
                     default=None,
                     metavar=spec.name.rpartition("_")[2].upper(),
-                    help=f"{spec.metadata['help']}{limits and f'; {limits}'} "
-                    f"(default: {spec.default or 'none'})",
+                    help=f"{text}{limits and f'; {limits}'} "
+                    f"(default: {nothing if spec.default in ('', ()) else spec.default})",
                 )
     for role, text in ROLES.items():
         own = add_role(roles, role, text, parents=[common])
@@ -294,25 +275,9 @@ def parser() -> argparse.ArgumentParser:
                 "--from",
                 dest="recording",
                 metavar="FILE.mcap",
-                nargs="+",
-                help="play this recording instead of the patrol: one file, all of its files, or "
-                "their folder. It feeds a twin of its own, with the time of the recording and a "
-                "temporary journal",
-            )
-            own.add_argument(
-                "--start",
-                type=_seconds,
-                metavar="SECONDS",
-                help="start this long after the first message of the recording; earlier messages "
-                "are published at once (default: 0)",
-            )
-            own.add_argument("--loop", action="store_true", help="play it again from its end")
-            own.add_argument(
-                "--skip-gaps",
-                type=_seconds,
-                default=math.inf,
-                metavar="SECONDS",
-                help="skip silences of the recording longer than this (default: wait)",
+                help="play this recording instead of the patrol: one file, or the folder of its "
+                "files. It feeds a twin of its own, with the time of the recording and a temporary "
+                "journal",
             )
     journal.add_parser(roles)
     administration.add_archive(roles)
@@ -320,16 +285,6 @@ def parser() -> argparse.ArgumentParser:
     adapt.add_options(add_role(roles, "adapt", adapt.HELP))
     administration.add_people(roles)
     return made
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0 to 1e9")
-    return value
 
 
 def _prepare_process() -> None:

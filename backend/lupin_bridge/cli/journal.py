@@ -18,7 +18,6 @@ from lupin_bridge.bags.recording import SUFFIX
 from lupin_bridge.console import (
     FAILED,
     CommandError,
-    Progress,
     Roles,
     add_actions,
     backup,
@@ -29,23 +28,18 @@ from lupin_bridge.console import (
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.query_string import MAX_SECONDS, moment
-from lupin_bridge.settings import SettingError, settings_from, variable
+from lupin_bridge.settings import SettingError, settings_from
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.checking import (
     RunExtent,
     extents,
     find_all_damage,
-    quarantined_beside,
     row_counts,
     sensors_of,
-    size_of,
-    tags_of,
 )
 from lupin_twin.journal.paths import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.rebuild import handle_interrupts, vacuum
 from lupin_twin.journal.retention import (
-    RETENTION_BYTES,
-    RETENTION_NS,
     forget,
     pages_of,
     records,
@@ -55,7 +49,6 @@ from lupin_twin.journal.schema import (
     Empty,
     Foreign,
     NotPossible,
-    get_meta,
     is_damage_error,
     open_named,
 )
@@ -114,14 +107,6 @@ def add_parser(roles: Roles) -> None:
                 "--from", dest="start", metavar="TIME", help=f"start of the period: {when}"
             )
             own.add_argument("--to", dest="end", metavar="TIME", help=f"end, exclusive: {when}")
-            own.add_argument("--tag", metavar="ID", help="this tag only")
-            own.add_argument("--sensor", metavar="NAME", help="this sensor only")
-            own.add_argument(
-                "--sensors", metavar="FILE", help=f"sensors file (default: {variable('sensors')})"
-            )
-            own.add_argument(
-                "--config", metavar="FILE", help=f"settings file (default: {variable('config')})"
-            )
 
 
 def add_which(parser: argparse.ArgumentParser) -> None:
@@ -232,7 +217,6 @@ def _info(path: Path) -> int:
 def _lines(connection: sqlite3.Connection, path: Path) -> Iterator[tuple[str, str]]:
     pages, free, page_bytes = pages_of(connection)
     yield "size", f"{_mb(pages * page_bytes)}, {_mb(free * page_bytes)} of it free"
-    yield "log", _mb(size_of(path.with_name(path.name + "-wal")))
     yield "recording", holder_of(path) or "nobody"
     rows = row_counts(connection)
     yield "scans", f"{rows['scan']:,}, {rows['failure']:,} of them failed"
@@ -242,13 +226,10 @@ def _lines(connection: sqlite3.Connection, path: Path) -> Iterator[tuple[str, st
     yield "sensors", ", ".join(sensors_of(connection)) or "none"
     found = extents(connection)
     yield "reach", _reach(found)
-    yield "hours", f"{rows['hour']:,} of a tag's sensors"
-    yield "retention", _retention(connection)
     hidden = max(0, len(found) - _RUNS_SHOWN)
     shown = f", the last {_RUNS_SHOWN}" if hidden else ""
     yield "runs", f"{len(found):,} of the clock{shown}"
     yield from (("", _run_line(extent)) for extent in found[hidden:])
-    yield from (("quarantined", f"{it}, {_mb(size)}") for it, size in quarantined_beside(path))
     yield from (("forgotten", _forgotten_line(record)) for record in records(connection))
 
 
@@ -260,14 +241,6 @@ def _reach(found: list[RunExtent]) -> str:
     first = min(first_ns or 0 for first_ns, _ in of_wall)
     last = max(last_ns or 0 for _, last_ns in of_wall)
     return f"{iso(first)} to {iso(last)}"
-
-
-def _retention(connection: sqlite3.Connection) -> str:
-    kept_ns = int(get_meta(connection, RETENTION_NS) or 0)
-    if not kept_ns:
-        return "not written yet by its twin"
-    kept_bytes = int(get_meta(connection, RETENTION_BYTES) or 0)
-    return f"{kept_ns / 86_400e9:g} days and {_mb(kept_bytes)} at most; hours for good"
 
 
 def _run_line(extent: RunExtent) -> str:
@@ -293,14 +266,11 @@ def _forgotten_line(record: Mapping[str, Any]) -> str:
 
 def _check(path: Path) -> int:
     found = 0
-    progress = Progress()
     with closing(_reader(path)) as connection:
-        for wrong in find_all_damage(connection, progress.tell):
+        for wrong in find_all_damage(connection):
             found += 1
             if found <= _MAX_SHOWN:
-                progress.clear()
                 _say(wrong)
-    progress.clear()
     if found > _MAX_SHOWN:
         _say(f"and {found - _MAX_SHOWN:,} more")
     _say(f"{path} is {f'damaged in {found:,} places' if found else 'whole'}")
@@ -317,31 +287,16 @@ def _export(path: Path, options: argparse.Namespace, environ: Mapping[str, str])
         raise CommandError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
-    given = {"sensors": options.sensors}
-    sensors = Criteria.of(settings_from(given, environ, options.config)).sensors
+    sensors = Criteria.of(settings_from({}, environ)).sensors
     with closing(_reader(path)) as connection:
-        lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
         standard(bodies.CSV_HEADER)
-        is_empty = True
-        for lot in lots:
+        for lot in rows(connection, start_ns, end_ns):
             standard(bodies.csv_lines(lot, sensors))
-            is_empty = False
-        if is_empty:
-            tags, names = _some(tags_of(connection)), _some(sensors_of(connection))
-            say(f"nothing matches; the journal has the tags {tags} and the sensors {names}")
     return 0
-
-
-def _some(names: list[str]) -> str:
-    more = f" and {len(names) - _MAX_SHOWN:,} more" if len(names) > _MAX_SHOWN else ""
-    return (", ".join(names[:_MAX_SHOWN]) or "none") + more
 
 
 def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:
     target: Path = options.recording
-    for name in ("tag", "sensor"):
-        if getattr(options, name) is not None:
-            raise CommandError(f"--{name} is for CSV: {target} holds whole observations")
     if target.suffix != SUFFIX:
         raise CommandError(f"{target} does not end in {SUFFIX}, as a recording must")
     try:
@@ -365,10 +320,8 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
 
 
 def _backup(path: Path, target: Path) -> int:
-    progress = Progress()
     with closing(_reader(path)) as connection:
-        size = backup(connection, target, lambda share: progress.tell("copying", share))
-    progress.clear()
+        size = backup(connection, target)
     _say(f"{target}: {_mb(size)}, a copy of {path}")
     return 0
 
@@ -395,9 +348,7 @@ def _forget(path: Path, options: argparse.Namespace) -> int:
 
 
 def _vacuum(path: Path) -> int:
-    progress = Progress()
-    before, after = vacuum(path, "lupin-twin journal vacuum", progress.tell)
-    progress.clear()
+    before, after = vacuum(path, "lupin-twin journal vacuum")
     _say(f"{path}: {_mb(before)} before, {_mb(after)} after")
     return 0
 

@@ -26,7 +26,7 @@ from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies, exposure
 from lupin_bridge.app import create_app, has_page
 from lupin_bridge.archive import forwarding as archive
-from lupin_bridge.archive.database import ArchiveError, check_url, open_archive
+from lupin_bridge.archive.database import check_url
 from lupin_bridge.bags.recording import INPUTS, Recording, RecordingError
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource, ailment
@@ -107,9 +107,7 @@ def patrolled(
     )
 
 
-def recorded(
-    files: Sequence[str], play_args: Sequence[str], ros_args: Sequence[str], folder: Path
-) -> Feed:
+def recorded(path: str, play_args: Sequence[str], ros_args: Sequence[str], folder: Path) -> Feed:
     """Feed the twin by a recording, which `lupin_bridge.bags.player` plays with these options.
 
     Its journal is in `folder`, for this recording alone. The twin subscribes to the topics as they
@@ -119,13 +117,13 @@ def recorded(
         lupin_bridge.bags.recording.RecordingError: it cannot be played.
 
     """
-    with Recording([Path(file) for file in files]) as recording:
+    with Recording(Path(path)) as recording:
         inputs = recording.inputs
     journal = folder / "journal.sqlite"
     topics = {INPUTS[kind].parameter: name for name, kind in inputs.items()}
     return Feed(
         "player",
-        ["lupin_bridge.bags.player", *files, *play_args, *ros_args],
+        ["lupin_bridge.bags.player", path, *play_args, *ros_args],
         _parameters(**topics, journal=str(journal), use_sim_time=True),
         "recorded",
     )
@@ -200,12 +198,12 @@ def run(
     ros_args: Sequence[str],
     feed_args: Sequence[str] = (),
     *,
-    recording: Sequence[str] = (),
+    recording: str | None = None,
 ) -> None:
     """Run a role until a signal ends it.
 
     `feed_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both. With `recording` (its files) they are those of its
+    a namespace or a remapping holds for both. With `recording` (its path) they are those of its
     player, which takes the patrol's place.
 
     Raises:
@@ -401,7 +399,6 @@ async def _run_fleet(
     from lupin_bridge.fleet.app import Fleet, create_fleet_app  # noqa: PLC0415  # not for a twin
 
     listener = _open_listener(settings, access)
-    await asyncio.to_thread(_report_error, settings.archive_url)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # For the processes that read; not on their command line, which others can read.
     os.environ[variable("archive_url")] = settings.archive_url
@@ -416,12 +413,3 @@ async def _run_fleet(
         await serve(server, listener, settings, supervisor, lambda: None)
     finally:
         await fleet.stop()
-
-
-def _report_error(url: str) -> None:
-    """Log at once if the archive cannot be read; that may pass, so the page is served anyway."""
-    try:
-        with closing(open_archive(url)):
-            pass
-    except ArchiveError as error:
-        log.error("%s; it will be retried", error)  # noqa: TRY400  # one line

@@ -87,14 +87,6 @@ class Sample:
     stamp_ns: int
 
 
-@dataclass(frozen=True, slots=True)
-class RosTime:
-    """ROS time, ns; `is_simulated`: it follows `/clock`, and is 0 until that publishes."""
-
-    now_ns: int
-    is_simulated: bool
-
-
 class Bounded:
     """The newest samples of a topic, within its bounds."""
 
@@ -203,16 +195,6 @@ class Relay:
             lambda node: self._ros.published(node, is_wanted)
         )
         return found
-
-    async def time(self) -> RosTime:
-        """ROS time now.
-
-        Raises:
-            TwinUnavailableError: the ROS thread has ended.
-
-        """
-        now: RosTime = await self._thread().call(self._ros.time)
-        return now
 
     def read(self, topic: Topic, sample: Sample) -> Any:
         """The ROS message of a sample. Call it on a worker: a map takes a while.

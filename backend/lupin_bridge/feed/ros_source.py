@@ -25,7 +25,7 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.relay import Relay, RosTime, Sample, TwinNames
+from lupin_bridge.feed.relay import Relay, Sample, TwinNames
 from lupin_bridge.feed.ros_thread import NodeT, RosThread
 from lupin_bridge.feed.source import (
     MAX_AHEAD_NS,
@@ -328,11 +328,6 @@ class RelayRos:
             if is_wanted(name, type_name)
             and any(one.topic_type == type_name for one in node.get_publishers_info_by_topic(name))
         }
-
-    def time(self, node: Any) -> RosTime:
-        """ROS time by the node's clock."""
-        clock = node.get_clock()
-        return RosTime(clock.now().nanoseconds, bool(clock.ros_time_is_active))
 
     def read(self, topic: Topic, data: bytes) -> Any:
         """Deserialize as the nodes do, in any thread; lengths are checked first.

@@ -38,7 +38,7 @@ TRAIL_NS: Final = 3600 * NANOSECONDS_PER_SECOND
 TRAIL_STEP_M: Final = 0.1
 TRAIL_STEP_NS: Final = NANOSECONDS_PER_SECOND
 TRAIL_POINTS: Final = 720
-# A plan expires this long after it was published, or once the robot is within ARRIVED_M of its end.
+# A plan expires this long after it was published, and is not shown within ARRIVED_M of its end.
 PLAN_NS: Final = 600 * NANOSECONDS_PER_SECOND
 ARRIVED_M: Final = 0.5
 
@@ -87,8 +87,8 @@ class RobotLog:
     def __init__(self) -> None:
         self.now = Robot()
         self.trail: list[Position] = []
-        # Whether the robot has been away from its plan's end: a round ends where it begins.
-        self._was_away = False
+        # Also while the robot is at its end, where a round begins too.
+        self._plan: Plan | None = None
 
     def take(self, reported: Robot, now_ns: int | None) -> bool:
         """Take what was received since the last call; returns whether anything has changed.
@@ -104,12 +104,9 @@ class RobotLog:
         position = _newest(before.position, reported.position, future_ns)
         if position is not None and position is reported.position:
             self._extend(position)
-        known = _newest(before.plan, None, future_ns)
-        plan = _newest(known, reported.plan, future_ns)
-        if plan is not None and plan is reported.plan and not (known and _same_end(known, plan)):
-            self._was_away = False
+        self._plan = _newest(self._plan, reported.plan, future_ns)
         battery = _newest(before.battery, reported.battery, future_ns)
-        self.now = Robot(position, self._pending(plan, position, now_ns), battery)
+        self.now = Robot(position, self._pending(position, now_ns), battery)
         return self.now != before
 
     def _extend(self, position: Position) -> None:
@@ -122,23 +119,14 @@ class RobotLog:
         if len(self.trail) > TRAIL_POINTS:
             del self.trail[1 : TRAIL_POINTS // 2 : 2]
 
-    def _pending(
-        self, plan: Plan | None, position: Position | None, now_ns: int | None
-    ) -> Plan | None:
+    def _pending(self, position: Position | None, now_ns: int | None) -> Plan | None:
+        plan = self._plan
         if plan is None or not plan.points:
             return None
         if now_ns is not None and plan.at_ns < now_ns - PLAN_NS:
             return None
-        if position is None or position.at_ns < plan.at_ns:
-            return plan
-        x, y = plan.points[-1]
-        is_away = math.hypot(position.x - x, position.y - y) > ARRIVED_M
-        self._was_away |= is_away
-        return None if self._was_away and not is_away else plan
-
-
-def _same_end(a: Plan, b: Plan) -> bool:
-    return bool(a.points and b.points) and math.dist(a.points[-1], b.points[-1]) <= ARRIVED_M
+        is_there = position and math.dist((position.x, position.y), plan.points[-1]) <= ARRIVED_M
+        return None if is_there else plan
 
 
 def _newest(known: ValueT | None, reported: ValueT | None, future_ns: int) -> ValueT | None:

@@ -21,6 +21,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from lupin_msgs.srv import GetWrites
+
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
@@ -396,7 +398,7 @@ class WebTwin(RosSource[WebNode]):
             )
         if why := await self.thread.call(lambda node: node.why_no_rows()):
             raise TwinUnavailableError(why)
-        request = convert_services.rows_request_message(after)
+        request = GetWrites.Request(after=after)
         response = await self._in_time(
             self.thread.ask(
                 lambda node: node.rows.call_async(request),

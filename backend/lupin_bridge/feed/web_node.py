@@ -14,7 +14,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.validate_topic_name import validate_topic_name
 
 from lupin_twin.core import interfaces
-from lupin_twin.core.clock import StampWatch
+from lupin_twin.core.clock import reported_clock
 from lupin_twin.core.diagnostics import SelfReport, self_report
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import Snapshot, TagState
@@ -95,7 +95,6 @@ class WebNode(AdjustableNode):
         # The newest message of each, not yet shown; they belong together if their stamps are equal.
         self._state: Any = None
         self._times: Any = None
-        self._stamp_watch = StampWatch()
         self._report = SelfReport()
         self._reported_s = -math.inf
         self._topics: dict[str, str] = {}
@@ -209,12 +208,10 @@ class WebNode(AdjustableNode):
         self.utilities.check_twins(self.twins, topic, "what is shown is a mixture")
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)
-        now_s = time.monotonic()
-        clock = self._stamp_watch.update(
+        clock = reported_clock(
+            self.self_report.clock,
             snapshot.stamp_ns,
-            now_s,
             ages_are_known=not any(math.isnan(tag.stale_seconds) for tag in msg.tags),
-            reported=self.self_report.clock,
         )
         snapshot = replace(snapshot, clock=clock)
         self._newest = snapshot

@@ -7,7 +7,6 @@ file has a head and a tail, so one writer has to see all of it. It holds at most
 from __future__ import annotations
 
 import io
-import json
 import pickle
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -32,9 +31,7 @@ class Csv:
     # Can be pickled.
     pack = staticmethod(bodies.csv_lines)
 
-    def __init__(
-        self, _sensors: Sensors, _facts: Mapping[str, str], _sensor: str | None, has_site: bool
-    ) -> None:
+    def __init__(self, _sensors: Sensors, _sensor: str | None, has_site: bool) -> None:
         self._has_site = has_site
 
     def begin(self) -> bytes:
@@ -128,9 +125,7 @@ class Parquet:
     media_type = "application/vnd.apache.parquet"
     pack = staticmethod(_pack_columns)
 
-    def __init__(
-        self, sensors: Sensors, facts: Mapping[str, str], sensor: str | None, has_site: bool
-    ) -> None:
+    def __init__(self, sensors: Sensors, sensor: str | None, has_site: bool) -> None:
         try:
             import pyarrow  # noqa: PLC0415  # the extra `science`, slow to import
             from pyarrow import parquet  # noqa: PLC0415
@@ -143,7 +138,6 @@ class Parquet:
             "status": pyarrow.uint8(),
             **dict.fromkeys(("x_m", "y_m", "value"), pyarrow.float64()),
         }
-        known = {name: it.unit for name, it in sensors.by_name.items()}
         # If there is only one sensor, all values have its unit.
         units = sensors.named(sensor).unit if sensor else _OF_VALUES
         described = {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}
@@ -152,8 +146,7 @@ class Parquet:
                 pyarrow.field(name, kinds.get(name, pyarrow.string()), metadata=attributes)
                 for name, attributes in described.items()
                 if has_site or name != "site"
-            ],
-            metadata={**facts, "units": json.dumps(known)},
+            ]
         )
         self._sink = _Sink()
         self._writer: Any = parquet.ParquetWriter(self._sink, self._schema, compression="zstd")

@@ -129,10 +129,9 @@ class Field(StateQuery):
         sensor, sensors = self.criteria.sensors.named(request.sensor_type), self.criteria.sensors
         tags = plausible(with_derived(snapshot.tags, request.sensor_type), sensor)
         samples = samples_of(tags, request.sensor_type)
-        far_off = far_off_tags(snapshot.tags)
 
         def content_etag(kind: str, *content: object) -> str:
-            built_from = (request, samples, *content, far_off, self.rules, sensors.text)
+            built_from = (request, samples, *content, self.rules, sensors.text)
             return etag_of(kind, built_from)
 
         def quality(should_stop: ShouldStop) -> bytes:
@@ -141,7 +140,7 @@ class Field(StateQuery):
 
         if self.field_format is None:
             of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
-            etag = etag or content_etag("quality", of)
+            etag = etag or content_etag("quality", of, far_off_tags(tags))
             return plan_of(etag, quality)
         field_format, scale = self.field_format, self.query.scale
         etag = etag or content_etag(f"field {field_format.name} {scale}")
@@ -150,7 +149,7 @@ class Field(StateQuery):
             grid = compute_field(request, samples, occupancy, self.rules, should_stop)
             body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
             metadata = formats.metadata(grid, sensor)
-            return _answer(body, field_format, sensor, etag, metadata=metadata, far_off=far_off)
+            return _answer(body, field_format, sensor, etag, metadata=metadata)
 
         return Plan(etag, write)
 
@@ -175,12 +174,10 @@ def _answer(
     etag: str,
     *,
     metadata: Mapping[str, str],
-    far_off: Sequence[str],
     kind: str = "Field",
 ) -> Answer:
-    """The answer, with its metadata as headers, and how many far-off tags are left out."""
-    known = {**metadata, "Far-Off-Count": str(len(far_off))}
-    headers = formats.headers(known, f"{sensor.name}.{field_format.name}", kind)
+    """The answer, with its metadata as headers."""
+    headers = formats.headers(metadata, f"{sensor.name}.{field_format.name}", kind)
     return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
 
 
@@ -255,12 +252,12 @@ class Estimated(Field):
         sensor = self.criteria.sensors.named(box.sensor_type)
         since_ns = at_ns - int(self.day_length_s * NANOSECONDS_PER_SECOND)
         pasts = _that_count(pasts, since_ns, sensor)
-        request, far_off = EstimateRequest(box, at_ns), far_off_tags(snapshot.tags)
+        request = EstimateRequest(box, at_ns)
         query, sensors = self.query, self.criteria.sensors
         field_format = self.field_format or JSON
         etag = etag_of(
             f"estimate {field_format.name} {query.layer} {query.scale}",
-            (request, pasts, far_off, self.day_length_s, sensors.text),
+            (request, pasts, self.day_length_s, sensors.text),
         )
 
         def write(should_stop: ShouldStop) -> Answer:
@@ -271,7 +268,6 @@ class Estimated(Field):
             return _answer(
                 *(body, field_format, sensor, etag),
                 metadata=metadata,
-                far_off=far_off,
                 kind="Estimate",
             )
 

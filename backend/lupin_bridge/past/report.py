@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import heapq
 from array import array
-from bisect import bisect_left
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, pairwise
 from typing import Any, Final
 
 import orjson
@@ -20,7 +18,7 @@ import orjson
 from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import LogReader
 from lupin_bridge.judge.alarm_fold import AlarmFold
-from lupin_bridge.judge.episodes import SITE, readings_of
+from lupin_bridge.judge.episodes import readings_of
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies
@@ -42,7 +40,7 @@ from lupin_twin.core.past import (
     SeriesRequest,
     silence_ns,
 )
-from lupin_twin.core.state import STATUS_OK, Reading, TagState
+from lupin_twin.core.state import STATUS_OK
 
 # A day at one scan a second has 86,400. Each takes some 25 us, and three times that where alarms
 # are derived; an answer has ten seconds.
@@ -93,17 +91,10 @@ class Report:
             fold.take(log.observed(*stretch))
         notes, snapshot = log.notes(NotesRequest()).notes or (), log.state(self.end_ns - 1)
         known = [tag.tag_id for tag in snapshot.tags]
-        body, days = fold.body(notes, known), fold.days()
-        return self.plan(
-            body,
-            [
-                replace(tag, readings=(*tag.readings, *days.get(tag.tag_id, ())))
-                for tag in snapshot.tags
-            ],
-        )
+        return self.plan(fold.body(notes, known))
 
-    def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:  # noqa: ARG002
-        """The plan of the answer; `tags` as they were at the end, with their daily quantities."""
+    def plan(self, body: dict[str, Any]) -> Plan:
+        """The plan of the answer."""
         return of_content(content_answer(orjson.dumps(body), headers=self._headers()))
 
     def _headers(self) -> dict[str, str]:
@@ -179,18 +170,17 @@ class _Fold:
         self._sensors: defaultdict[str, _Extremes] = defaultdict(_Extremes)
         self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
         self._scanned: set[str] = set()
-        # The stamps of all attempts, and of those at each tag's sensors; before the period too.
+        # The stamps of all attempts, and of the last ones of each tag; before the period too.
         self._attempted_ns = array("q")
-        self._attempted_at_ns: dict[str, array[int]] = {}
+        self._recent_ns = defaultdict[str, deque[int]](lambda: deque(maxlen=RECENT_COUNT))
 
     def take(self, found: PastWrites) -> None:
         """Take the next writes."""
         for write in found.writes:
             self._attempted_ns.append(write.stamp_ns)
-            if write.kind != KIND_FLOWER:
-                mine = self._attempted_at_ns.setdefault(write.tag_id, array("q"))
-                if not mine or mine[-1] != write.stamp_ns:
-                    mine.append(write.stamp_ns)
+            recent_ns = self._recent_ns[write.tag_id]
+            if write.kind != KIND_FLOWER and write.stamp_ns not in recent_ns:
+                recent_ns.append(write.stamp_ns)
             if write.stamp_ns >= self._of.start_ns:
                 self._count(write)
         if self._alarm_fold is None:
@@ -265,10 +255,7 @@ class _Fold:
                 for alarm in heapq.nsmallest(MAX_LISTED, alarms, key=active_first)
             ],
             "notes": [note_json(note, gone) for note in spoken[::-1][:MAX_LISTED]],
-            "silences": [
-                {"tag_id": tag_id, **bodies.stretch(*silence)}
-                for tag_id, silence in silences[:MAX_LISTED]
-            ],
+            "silences": [bodies.stretch(*silence) for silence in silences[:MAX_LISTED]],
             "sensors": [self._of_sensor(name) for name in sensors[:MAX_LISTED]],
             "never_scanned": never[:MAX_LISTED],
             "left_out": {
@@ -283,10 +270,6 @@ class _Fold:
             },
             **bodies.period_fields(self._of.journal, start_ns, end_ns),
         }
-
-    def days(self) -> Mapping[str, Sequence[Reading]]:
-        """By tag, the daily quantities of its last day."""
-        return self._alarm_fold.found(self._of.known_ns - 1).days if self._alarm_fold else {}
 
     def _of_sensor(self, name: str) -> dict[str, Any]:
         of = self._sensors[name]
@@ -306,45 +289,12 @@ class _Fold:
             "high": extreme(of.high),
         }
 
-    def _silences(self) -> list[tuple[str, Stretch]]:
-        """The silences of the greenhouse, then those of single tags, each longest first."""
-        start_ns, end_ns = self._of.start_ns, self._of.known_ns
-        last_ns = {tag: list(at_ns[-RECENT_COUNT:]) for tag, at_ns in self._attempted_at_ns.items()}
-        whole = list(silences(self._attempted_ns, end_ns, silence_ns(last_ns.values())))
-        found = [
-            (tag_id, silence)
-            for tag_id, attempted_ns in self._attempted_at_ns.items()
-            for silence in silences(attempted_ns, end_ns, silence_ns([last_ns[tag_id]]), whole)
+    def _silences(self) -> list[Stretch]:
+        """The times without an attempt at any tag; before the first one, there is none."""
+        longest_ns = silence_ns([list(recent_ns) for recent_ns in self._recent_ns.values()])
+        until_ns = [*self._attempted_ns[1:], self._of.known_ns]
+        return [
+            (max(from_ns, self._of.start_ns), to_ns)
+            for from_ns, to_ns in zip(self._attempted_ns, until_ns, strict=False)
+            if to_ns - from_ns > longest_ns and to_ns > self._of.start_ns
         ]
-        cut = [
-            (tag_id, (max(from_ns, start_ns), to_ns))
-            for tag_id, (from_ns, to_ns) in ((*((SITE, it) for it in whole), *found))
-            if to_ns > start_ns
-        ]
-        return sorted(cut, key=lambda it: (it[0] != SITE, it[1][0] - it[1][1], *it))
-
-
-def silences(
-    attempted_ns: Sequence[int], end_ns: int, longest_ns: int, but: Sequence[Stretch] = ()
-) -> Iterator[Stretch]:
-    """Yield stretches without an attempt that are longer than `longest_ns`.
-
-    Time within `but`, ascending stretches, does not count. Before the first attempt there is no
-    silence.
-    """
-    if not attempted_ns:
-        return
-    starts_ns = [from_ns for from_ns, _ in but]
-    up_to = [0, *accumulate(to_ns - from_ns for from_ns, to_ns in but)]
-
-    def within_but(until_ns: int) -> int:
-        index = bisect_left(starts_ns, until_ns)
-        late_ns = max(0, but[index - 1][1] - until_ns) if index else 0
-        return up_to[index] - late_ns
-
-    for at_ns, later_ns in pairwise((*attempted_ns, end_ns)):
-        length_ns = later_ns - at_ns
-        if length_ns > longest_ns:
-            length_ns -= within_but(later_ns) - within_but(at_ns)
-            if length_ns > longest_ns:
-                yield at_ns, later_ns

@@ -7,7 +7,6 @@ the sensors file.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
@@ -20,13 +19,10 @@ import orjson
 
 from lupin_bridge.judge.episodes import SITE
 from lupin_bridge.judge.judging import Criteria, unix_s
-from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.past.report import Report
 from lupin_bridge.serving.admission import content_answer
-from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import Reading, TagState
 
 HTML_TYPE: Final = "text/html; charset=utf-8"
 _POLICY: Final = (
@@ -37,8 +33,6 @@ PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Decimal comma and thousands point, in all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 _EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
-# More active alarms than this that share a cause are below one heading, as on the page.
-MOST_LOOSE: Final = 4
 # Alarms in one notification.
 MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
@@ -80,31 +74,19 @@ def push_text(
 class ReportPage(Report):
     """The report as a page in the language `lang`; times are in `zone`; None: the greenhouse's.
 
-    `unknown_zone` is a requested zone that this machine does not know; empty: there is none.
     `origin` is where observations come from; `site` is the greenhouse's name, if it has one.
     """
 
     lang: str = "en"
     zone: tzinfo | None = None
-    unknown_zone: str = ""
     origin: Origin = "unknown"
     site: str = ""
 
-    def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:
+    def plan(self, body: dict[str, Any]) -> Plan:
         """See `Report`."""
-        words = _Page(self.lang, self.criteria, self.zone, tags)
-        page = words.page(body, self.origin, self.site, self.unknown_zone)
+        page = _Page(self.lang, self.criteria, self.zone).page(body, self.origin, self.site)
         headers = {**self._headers(), **PAGE_HEADERS}
         return of_content(content_answer(page.encode("utf-8", "replace"), HTML_TYPE, headers))
-
-
-def refused_page(reason: str, lang: str) -> str:
-    """A page that says why there is no report, with a link to request it again."""
-    words = _words()[lang]
-    return (
-        f"{_head(lang, words['refused'])}<p>{escape(reason)}</p>"
-        f'<p><a href="">{escape(words["again"])}</a></p></body></html>'
-    )
 
 
 def _head(lang: str, title: str, period: str = "") -> str:
@@ -119,15 +101,8 @@ def _head(lang: str, title: str, period: str = "") -> str:
 
 
 class _Page:
-    def __init__(
-        self,
-        lang: str,
-        criteria: Criteria,
-        zone: tzinfo | None = None,
-        tags: Sequence[TagState] = (),
-    ) -> None:
+    def __init__(self, lang: str, criteria: Criteria, zone: tzinfo | None = None) -> None:
         self._lang = lang
-        self._tags = {tag.tag_id: tag for tag in tags}
         self._zone = zone or criteria.clock.zone
         self._words = _words()[lang]
         self._criteria = criteria
@@ -135,7 +110,7 @@ class _Page:
         named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
-    def page(self, body: Entry, origin: Origin, site: str, unknown_zone: str) -> str:
+    def page(self, body: Entry, origin: Origin, site: str) -> str:
         say, at = self.say, self._at
         # Rows omit the date of the first day.
         day, comma, _ = at(body["from"]).rpartition(", ")
@@ -156,7 +131,6 @@ class _Page:
             f"<p><strong>{escape(hint)}</strong></p>" if hint else "",
             f"<p>{escape(period)}. ",
             f"{escape(say('zone', zone=self._zone_name(body['from'], body['to'])))}</p>",
-            f"<p>{escape(say('no_zone', zone=unknown_zone))}</p>" if unknown_zone else "",
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
             self._counts(body["counts"]),
             self._alarms(body),
@@ -164,9 +138,7 @@ class _Page:
             self._table(
                 body, "notes", "notes", ("time", "name", "said", "about"), self._note(body)
             ),
-            self._table(
-                body, "silences", "silences", ("where", "from", "to", "length"), self._silence
-            ),
+            self._table(body, "silences", "silences", ("from", "to", "length"), self._silence),
             f"<h2>{escape(say('never'))}</h2><p>",
             escape(", ".join(body["never_scanned"]) or say("none")),
             f"</p>{self._more(body, 'never_scanned')}</body></html>",
@@ -196,8 +168,8 @@ class _Page:
         cleared = [alarm for alarm in body["alarms"] if alarm["cleared_at"] is not None]
         return (
             later
-            + self._of_alarms("active_alarms", active, ("when", "at_end*", "worst*", "limits*"))
-            + self._of_alarms("cleared", cleared, ("when", "end", "length", "worst*", "limits*"))
+            + self._of_alarms("active_alarms", active, ("when", "worst*"))
+            + self._of_alarms("cleared", cleared, ("when", "end", "length", "worst*"))
             + self._more(body, "alarms")
         )
 
@@ -210,13 +182,7 @@ class _Page:
             found = self._alarm(alarm)
             return [found[name.removesuffix("*")] for name in names]
 
-        is_active = title == "active_alarms"
-        counts = Counter(self._what(alarm["reason"]) for alarm in alarms if is_active)
-        groups: dict[str, list[Entry]] = {}
-        for alarm in alarms:
-            cause = self._what(alarm["reason"])
-            groups.setdefault(cause if counts[cause] > MOST_LOOSE else "", []).append(alarm)
-        return self._list(title, "alarms", groups, names, cells)
+        return self._list(title, "alarms", alarms, names, cells)
 
     def _who(self, alarm: Entry) -> str:
         """Who has acknowledged or shelved an alarm."""
@@ -228,50 +194,18 @@ class _Page:
 
     def _alarm(self, alarm: Entry) -> Mapping[str, str]:
         """The cells of an alarm, by their columns; its status is that of its worst value."""
-        reason, tag = alarm["reason"], self._tags.get(alarm["tag_id"])
-        raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
-        numbers, verdict = reason["kind"] == "range", self._words["verdicts"][reason["verdict"]]
-        number, at_end = partial(self._number, sensor=reason["sensor"]), ""
-        worst = number(alarm["worst"], limit=limit)
-        if tag is not None:
-            pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
-            name = reason["sensor"] if numbers else reason["kind"]
-            for it in (*tag.readings, *derive(tag.readings)) if numbers else (pests,):
-                if it.name == name:
-                    at_end = number(it.value, limit=limit)
-                    if at_end and it.observed_at_ns is not None:
-                        at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
+        reason, raised, cleared = alarm["reason"], alarm["raised_at"], alarm["cleared_at"]
+        verdict = self._words["verdicts"][reason["verdict"]]
+        worst = self._number(alarm["worst"], reason["sensor"], reason["limit"])
         return {
             "alarm": self._what(reason),
             "point": alarm["tag_id"] or self.say("house"),
             "when": self._clock(raised),
             "end": "" if cleared is None else self._clock(cleared),
             "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
-            "at_end": at_end,
             "worst": f"{worst} ({verdict})" if worst else verdict,
-            "limits": self._limits(reason, tag) if numbers else "",
             "who": self._who(alarm),
         }
-
-    def _limits(self, reason: Entry, tag: TagState | None) -> str:
-        """The range of its status whose limit, or the ideal one's, was passed at the start.
-
-        Only that limit, if no range of today has it. A range is written as on the page.
-        """
-        sensor = self._criteria.sensors.named(reason["sensor"])
-        number = partial(self._number, sensor=reason["sensor"])
-        is_critical = reason["verdict"] == "critical"
-        for species in ("" if tag is None else tag.flower.species, ""):
-            for is_day in (True, False):
-                ranges = sensor.ranges(is_day=is_day, species=species)
-                for span in (ranges.ideal, ranges.critical):
-                    if span is not None and reason["limit"] in {span.low, span.high}:
-                        whole = ranges.critical or span if is_critical else span
-                        low = number(whole.low).removesuffix(f"\u00a0{sensor.unit}")
-                        # No-break spaces keep it on one line.
-                        text = self.say("period", **{"from": low, "to": number(whole.high)})
-                        return text.replace(" ", "\u00a0")
-        return number(reason["limit"])
 
     def _sensor(self, of: Entry) -> Iterable[str]:
         number = partial(self._number, sensor=of["sensor_type"])
@@ -312,7 +246,7 @@ class _Page:
     def _silence(self, silence: Entry) -> Iterable[str]:
         length = self._length(silence["to"]["sec"] - silence["from"]["sec"])
         from_, to = self._clock(silence["from"]), self._clock(silence["to"])
-        return self._where(silence["tag_id"]), from_, to, length
+        return from_, to, length
 
     def _table(
         self,
@@ -323,36 +257,32 @@ class _Page:
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
         """A table of one list of the body, and how many entries are left out."""
-        return self._list(title, name, {"": body[name]}, columns, cells) + self._more(body, name)
+        return self._list(title, name, body[name], columns, cells) + self._more(body, name)
 
     def _list(
         self,
         title: str,
         name: str,
-        groups: Mapping[str, Sequence[Entry]],
+        entries: Sequence[Entry],
         columns: Sequence[str],
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
-        """A table, with a heading above each group; a column ending with `*` has numbers."""
+        """A table; a column ending with `*` has numbers."""
         kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
         head = f"<h2>{escape(self.say(title))}</h2>"
-        if not any(groups.values()):
+        if not entries:
             return f"{head}<p>{escape(self.say('none'))}</p>"
         names = "".join(
             f'<th scope="col"{kind}>{escape(self.say(column.removesuffix("*")))}</th>'
             for column, kind in zip(columns, kinds, strict=True)
         )
         rows = ""
-        for heading, entries in groups.items():
-            if heading:
-                text = f"{heading}: {self._count(len(entries))}"
-                rows += f'<tr><th colspan="{len(columns)}">{escape(text)}</th></tr>'
-            for entry in entries:
-                is_critical = entry.get("reason", {}).get("verdict") == "critical"
-                rows += '<tr class="critical">' if is_critical else "<tr>"
-                for cell, kind in zip(cells(entry), kinds, strict=True):
-                    rows += f"<td{kind}>{escape(cell)}</td>"
-                rows += "</tr>"
+        for entry in entries:
+            is_critical = entry.get("reason", {}).get("verdict") == "critical"
+            rows += '<tr class="critical">' if is_critical else "<tr>"
+            for cell, kind in zip(cells(entry), kinds, strict=True):
+                rows += f"<td{kind}>{escape(cell)}</td>"
+            rows += "</tr>"
         return (
             f'{head}<table class="{name}"><thead><tr>{names}</tr></thead>'
             f"<tbody>{rows}</tbody></table>"

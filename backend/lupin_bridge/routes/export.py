@@ -19,7 +19,7 @@ from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
-from lupin_bridge.query_string import MAX_SECONDS, OfExport, iso, parameters_of, read
+from lupin_bridge.query_string import MAX_SECONDS, OfExport, parameters_of, read
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
@@ -95,7 +95,7 @@ async def csv_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def parquet_route(request: Request) -> Response:
-    """The columns of the CSV; `time` is a timestamp. Columns and file carry metadata."""
+    """The columns of the CSV; `time` is a timestamp. Columns carry metadata."""
     return await _of_site(request, Parquet)
 
 
@@ -151,11 +151,9 @@ async def respond_export(
         log.warning("the export of %s is old and is ended for another one", client)
         connection.dismiss()
 
-    facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
-
     async def begin() -> Begun:
         def opened() -> Csv | Parquet:
-            return kind(sensors, facts, given.sensor_type, has_site)
+            return kind(sensors, given.sensor_type, has_site)
 
         writer = await _written(of, kind, opened)
         lots = rows(partial(kind.pack, sensors=sensors))
@@ -186,15 +184,6 @@ async def _parts(of: Exporting, kind: Format, begun: Begun) -> Lots:
             yield await _written(of, kind, partial(writer.add, lot))
             lot = await within_time(of.limits, anext(lots, None))
         yield await _written(of, kind, writer.end)
-
-
-def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dict[str, str]:
-    """A file's metadata; moments are in ISO 8601, or in ROS seconds as in the headers."""
-    facts = {name.removeprefix("X-").lower().replace("-", "_"): it for name, it in known.items()}
-    start_ns, end_ns = span_of(given, now_ns)
-    if start_ns:
-        facts["from"] = iso(start_ns)
-    return {**facts, "to": iso(end_ns)}
 
 
 async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) -> ResultT:

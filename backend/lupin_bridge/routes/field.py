@@ -22,7 +22,6 @@ from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     REFUSALS,
     bridge_of,
-    error_response,
     json_response,
     list_header,
     newest_field,
@@ -100,16 +99,12 @@ class InFormats:
                     "content": {each.media_type: binary for each in FORMATS if each is not JSON},
                 },
                 **self.refusals(),
-                **refusing({406: "the Accept header allows no available format"}),
             },
             name=self.name,
             **documented,
         )
         async def in_accepted_format(request: Request) -> Response:
             field_format = formats.negotiate(list_header(request, "accept"))
-            if field_format is None:
-                types = ", ".join(known.media_type for known in FORMATS)
-                return error_response(f"Accept allows none of {types}", 406, {"Vary": "Accept"})
             response = await self.or_refusal(answer(request, field_format))
             response.headers["Vary"] = "Accept"
             return response

@@ -9,7 +9,6 @@ from functools import cache
 from html import escape
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import quote
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -21,7 +20,7 @@ from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
-from lupin_bridge.field import weighted
+from lupin_bridge.field import listed
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     computed,
@@ -95,42 +94,29 @@ async def _written_once(
 
 
 def render(document: dict[str, Any], base_url: str) -> str:
-    """An OpenAPI document as one HTML page: routes, parameters, answers, and lines for curl."""
+    """The routes of an OpenAPI document as one HTML page, with parameters and lines for curl."""
     info = document["info"]
     title = f"{escape(info['title'])}: API"
-    operations = [
-        (f"{method.upper()} {path}", operation)
+    routes = "".join(
+        _route(f"{method.upper()} {path}", operation, base_url)
         for path, methods in document["paths"].items()
         for method, operation in methods.items()
-    ]
-    routes = "".join(_route(name, operation, base_url) for name, operation in operations)
-    names = [*(name for name, _ in operations), *document["components"]["schemas"]]
-    contents = "".join(
-        f'<li><a href="#{quote(_id_of(name))}">{escape(name)}</a></li>' for name in names
-    )
-    schemas = "".join(
-        _schema(name, described) for name, described in document["components"]["schemas"].items()
     )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
         f'<title>{title}</title><link rel="stylesheet" href="docs.css"></head><body>'
-        f'<nav aria-label="Contents"><ul>{contents}</ul></nav><main>'
         f"<h1>{title}</h1><p>{_prose(info['summary'])}</p>"
         f"<p>{_prose(info['description'])}</p>"
-        '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
+        '<p>With all types, for tools: <a href="openapi.json">/openapi.json</a></p>'
         '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
-        f"<h2>Routes</h2>{routes}<h2>Types</h2>{schemas}</main></body></html>"
+        f"<h2>Routes</h2>{routes}</body></html>"
     )
 
 
 def _prose(text: str) -> str:
     """Text as HTML; what is between backticks is code."""
     return re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
-
-
-def _id_of(name: str) -> str:
-    return name.replace(" ", "-")  # HTML forbids spaces
 
 
 def _route(name: str, operation: dict[str, Any], base_url: str) -> str:
@@ -144,54 +130,14 @@ def _route(name: str, operation: dict[str, Any], base_url: str) -> str:
         f"<td>{_prose(p.get('description', ''))}</td></tr>"
         for p in parameters
     )
-    answers = "".join(
-        f"<li>{escape(code)}: {_prose(answer['description'])} {_types(answer)}</li>"
-        for code, answer in operation["responses"].items()
-    )
     url = f"{base_url}{path}{'?' + query if query else ''}"
     return (
-        f'<section id="{escape(_id_of(name))}"><h3><code>{escape(name)}</code></h3>'
+        f"<section><h3><code>{escape(name)}</code></h3>"
         f"<p>{_prose(operation.get('summary', ''))}. {_prose(operation.get('description', ''))}</p>"
         f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
         + (f"<table>{rows}</table>" if rows else "")
-        + f"<details><summary>Answers {', '.join(map(escape, operation['responses']))}</summary>"
-        f"<ul>{answers}</ul></details></section>"
+        + "</section>"
     )
-
-
-def _types(answer: dict[str, Any]) -> str:
-    names = []
-    for media_type, content in answer.get("content", {}).items():
-        name = content.get("schema", {}).get("$ref", "").rpartition("/")[2]
-        link = f' <a href="#{escape(name)}">{escape(name)}</a>' if name else ""
-        names.append(f"<code>{escape(media_type)}</code>{link}")
-    return ", ".join(names)
-
-
-def _schema(name: str, described: dict[str, Any]) -> str:
-    rows = "".join(
-        f"<tr><td><code>{escape(field)}</code></td><td>{_type_of(prop)}</td>"
-        f"<td>{_prose(prop.get('description', ''))}</td></tr>"
-        for field, prop in described.get("properties", {}).items()
-    )
-    return (
-        f'<section id="{escape(name)}"><h3>{escape(name)}</h3>'
-        f"<p>{_prose(described.get('description', ''))}</p>"
-        f"<table>{rows}</table></section>"
-    )
-
-
-def _type_of(prop: dict[str, Any]) -> str:
-    if "$ref" in prop:
-        name = prop["$ref"].rpartition("/")[2]
-        return f'<a href="#{escape(name)}">{escape(name)}</a>'
-    if "anyOf" in prop:
-        return " or ".join(_type_of(option) for option in prop["anyOf"])
-    if prop.get("type") == "array":
-        return f"list of {_type_of(prop['items'])}"
-    if "enum" in prop:
-        return ", ".join(escape(repr(value)) for value in prop["enum"])
-    return escape(str(prop.get("const", prop.get("type", ""))))
 
 
 # --- the guide -----------------------------------------------------------------------------------
@@ -230,19 +176,15 @@ async def no_page() -> Response:
 
 
 def language_of(request: Request, known: Collection[str]) -> str:
-    """One of `known`: what `?lang=` asks for, else the best of `Accept-Language`, else English.
+    """One of `known`: what `?lang=` asks for, else the first in `Accept-Language`, else English.
 
     As in the HMI, "de-AT" and "DE" are German, and an unknown language is English.
     """
     wanted = request.query_params.get("lang")
     if wanted is not None:
         return _known_language(wanted, known) or "en"
-    found = "en", 0.0
-    for tag, weight in weighted(list_header(request, "accept-language")):
-        language = _known_language(tag, known)
-        if language is not None and weight > found[1]:  # of equals the first
-            found = language, weight
-    return found[0]
+    accepted = listed(list_header(request, "accept-language"))
+    return next(filter(None, (_known_language(tag, known) for tag in accepted)), "en")
 
 
 def _known_language(tag: str, known: Collection[str]) -> str | None:
@@ -264,7 +206,7 @@ async def sign_in(request: Request) -> Response:
     people, person = _access_of(request).people, person_of(request)
     if people is None or not people.is_on:
         return error_response("this bridge needs no token: there is nothing to sign in to", 404)
-    address, ends_others = client_of(request), False
+    address = client_of(request)
     if "authorization" not in request.headers:
         if not people.has_file:  # a session must not renew itself
             return error_response(
@@ -274,11 +216,9 @@ async def sign_in(request: Request) -> Response:
         person = await while_client_waits(
             request, people.check(given.name, given.password, address)
         )
-        ends_others = given.ends_others
     begun = None
     if person is not None:
-        signing_in = people.sign_in(person, address, ends_others=ends_others)
-        begun = await while_client_waits(request, signing_in)
+        begun = await while_client_waits(request, people.sign_in(person, address))
     if begun is None:
         return error_response("there is no such account, or the password is wrong", 401)
     name, cookie, lasts_s = begun

@@ -193,10 +193,9 @@ class _FoxgloveConversation(_Conversation):
 
     async def _converse(self) -> None:
         await self._offer.look()
-        info = server_info(self._offer.session_id, has_time=self._offer.has_time)
-        await self._send(info)
-        async with self._offer.followed(self._on_news):
-            self._on_news(None)
+        await self._send(server_info(self._offer.session_id))
+        async with self._offer.followed(self._on_change):
+            self._on_change()
             await self._receive_all()
 
     def _end(self) -> None:
@@ -241,11 +240,8 @@ class _FoxgloveConversation(_Conversation):
         self._session.put(key, sample)
         self._write_all()
 
-    def _on_news(self, time_ns: int | None) -> None:
-        if time_ns is None:
-            self._offer_is_due = True
-        else:
-            self._session.time_ns = time_ns
+    def _on_change(self) -> None:
+        self._offer_is_due = True
         self._write_all()
 
     def _on_writable(self) -> None:

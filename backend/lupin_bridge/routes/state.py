@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from datetime import UTC
 from typing import Annotated, Final
 
 from annotated_types import Ge
@@ -25,31 +24,21 @@ from lupin_bridge.past.plans import (
     tag_of,
 )
 from lupin_bridge.past.report import Report
-from lupin_bridge.past.report_page import (
-    HTML_TYPE,
-    PAGE_HEADERS,
-    ReportPage,
-    languages,
-    refused_page,
-)
+from lupin_bridge.past.report_page import ReportPage
 from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NOT_REMEMBERED,
-    REFUSALS,
     bridge_of,
     error_response,
     json_response,
-    list_header,
     newest_of,
     read_route,
-    refusal,
     refusing,
     respond,
     respond_as_of,
     respond_past,
 )
-from lupin_bridge.routes.pages import language_of
 from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
@@ -229,33 +218,16 @@ async def report_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(query_string.OfReportPage)},
 )
 async def report_page_route(request: Request) -> Response:
-    """The page has no scripts. A browser gets refusals as a page too."""
-    try:
-        return await _report_page(request)
-    except REFUSALS as error:
-        refused = refusal(error)
-        if "text/html" in list_header(request, "accept"):
-            page = refused_page(str(error), language_of(request, languages()))
-            headers = {**refused.headers, **PAGE_HEADERS}
-            del headers["content-length"], headers["content-type"]
-            return Response(page, refused.status_code, headers, HTML_TYPE)
-        return refused
-
-
-async def _report_page(request: Request) -> Response:
+    """The page has no scripts."""
     given = read(query_string.OfReportPage, request.query_params.multi_items())
     found = _report(request, given)
-    name = given.time_zone or ""
-    zone = zone_of(name) if name else None
-    unknown_zone = "" if zone else name[:64]
     page = ReportPage(
         found.start_ns,
         found.end_ns,
         found.criteria,
         found.journal,
         lang=given.lang,
-        zone=UTC if unknown_zone else zone,
-        unknown_zone=unknown_zone,
+        zone=zone_of(given.time_zone) if given.time_zone else None,
         origin=bridge_of(request).origin,
         site=bridge_of(request).site,
     )

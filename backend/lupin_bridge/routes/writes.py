@@ -92,7 +92,6 @@ async def notes_route(request: Request) -> Response:
             note_json(note, gone)
             for note in reversed(notes)
             if note.kind != WITHDRAW
-            and given.kind in {None, note.kind}
             and given.subject in {None, note.subject}
             and start_ns <= note.about_ns
             and (not end_ns or note.about_ns < end_ns)

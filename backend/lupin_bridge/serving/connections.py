@@ -5,8 +5,7 @@ limit. Out of descriptors, it logs an error for each entry in its backlog, and r
 second later: 97 MB of log in half a minute.
 
 A connection that has requested nothing yet, or does not take what it requested, is evicted before
-any new one is refused. The address with the most connections loses its own first, so however many
-it opens, it evicts only itself.
+any new one is refused, the longest waiting first.
 """
 
 from __future__ import annotations
@@ -19,14 +18,13 @@ import socket
 import ssl
 import struct
 from asyncio.sslproto import SSLProtocol
-from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from lupin_bridge.serving.admission import client_key
 from lupin_twin.core.drops import Throttle
 
 log = logging.getLogger(__name__)
@@ -102,38 +100,11 @@ class Evictable(Protocol):
     """A connection, or a handshake of TLS."""
 
     @property
-    def address(self) -> str:
-        """The client that it comes from (`admission.client_key`)."""
-
-    @property
     def waiting_since_s(self) -> float | None:
         """Since when it has only waited, s; None: it is being served."""
 
     def abort(self) -> None:
         """End it now."""
-
-
-def choose_evicted(connections: Iterable[Evictable], number: int) -> list[Evictable]:
-    """At most `number` waiting connections: of the largest addresses, the longest waiting first.
-
-    Each choice counts as one connection less for its address. Of two addresses with equally many,
-    the one with the longest waiting connection comes first.
-    """
-    sizes: Counter[str] = Counter()
-    waiting: defaultdict[str, list[tuple[float, int, Evictable]]] = defaultdict(list)
-    for order, connection in enumerate(connections):
-        sizes[connection.address] += 1
-        since_s = connection.waiting_since_s
-        if since_s is not None:
-            waiting[connection.address].append((since_s, order, connection))
-    # Each connection ranks by the size of its address without those chosen before it.
-    ranked = [
-        (earlier - sizes[address], *entry)
-        for address, own in waiting.items()
-        for earlier, entry in enumerate(sorted(own, key=lambda entry: entry[:2]))
-    ]
-    chosen = heapq.nsmallest(number, ranked, key=lambda entry: entry[:3])
-    return [connection for *_, connection in chosen]
 
 
 # Files that stay free for the rest of the process: DDS, the page's files.
@@ -163,7 +134,6 @@ def room_for_connections() -> int:
 class _Handshake:
     """A connection that has no protocol yet: TLS is being agreed on."""
 
-    address: str
     waiting_since_s: float | None
     task: asyncio.Task[None] | None = None
 
@@ -249,7 +219,7 @@ class Acceptor:
         return len(self._connections) + len(self._handshakes) >= self._room
 
     def _admit(self, connection: socket.socket) -> None:
-        handshake = _Handshake(_address_of(connection), self._loop.time())
+        handshake = _Handshake(self._loop.time())
         self._handshakes.add(handshake)
         handshake.task = self._loop.create_task(self._handshake(connection))
         handshake.task.add_done_callback(lambda _: self._handshakes.discard(handshake))
@@ -262,8 +232,10 @@ class Acceptor:
 
     def _make_room(self) -> bool:
         all_open: list[Evictable] = [*self._connections, *self._handshakes]
-        chosen = choose_evicted(all_open, max(1, int(self._room * EVICTED_SHARE)))
-        for connection in chosen:
+        waiting = [(it.waiting_since_s, it) for it in all_open if it.waiting_since_s is not None]
+        most = max(1, int(self._room * EVICTED_SHARE))
+        chosen = heapq.nsmallest(most, waiting, key=itemgetter(0))
+        for _, connection in chosen:
             connection.abort()
         self._warn(
             "%d connections are open, and there are files for %d: evicted the %d that have "
@@ -277,11 +249,3 @@ class Acceptor:
     def _warn(self, text: str, *values: object) -> None:
         if self._warnings.allow(text, self._loop.time()) is not None:
             log.warning(text, *values)
-
-
-def _address_of(connection: socket.socket) -> str:
-    try:
-        peer = connection.getpeername()
-    except OSError:
-        return ""  # it has gone already
-    return client_key(peer[0]) if isinstance(peer, tuple) else ""  # a Unix socket's has a path

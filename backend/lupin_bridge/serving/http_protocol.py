@@ -19,7 +19,6 @@ import h11
 import orjson
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
-from lupin_bridge.serving.admission import client_key
 from lupin_bridge.serving.connections import (
     CONNECTION_KEY,
     READ_BYTES,
@@ -54,7 +53,6 @@ class HttpConnection(H11Protocol, SmallReads):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
-        self.address = ""
         self._idle_since_s = 0.0
         self._deadline: asyncio.TimerHandle
 
@@ -69,8 +67,6 @@ class HttpConnection(H11Protocol, SmallReads):
     def connection_made(self, transport: Any) -> None:
         """Start to wait for a request."""
         super().connection_made(transport)
-        if self.client is not None:
-            self.address = client_key(self.client[0])
         bound_unsent(transport)
         transport.set_write_buffer_limits(HIGH_WATER_BYTES)
         self._idle_since_s = self.loop.time()

@@ -13,7 +13,6 @@ import socket
 import ssl
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, NoReturn
@@ -79,7 +78,6 @@ class Certificates:
         self._context = context
         self._served = self._version()
         self._warned = ""
-        self._expires = _expires(cert_file)
 
     async def watch(self) -> NoReturn:
         """Check the files periodically, for ever."""
@@ -88,16 +86,7 @@ class Certificates:
             self.look()
 
     def look(self) -> None:
-        """Serve what the files hold, if that has changed and is valid; warn once it has expired."""
-        self._renew()
-        if self._expires is not None and self._expires <= datetime.now(UTC):
-            log.warning(
-                "the TLS certificate %s expired at %s, and browsers refuse it: renew it",
-                *(self._files[0], self._expires),
-            )
-            self._expires = None
-
-    def _renew(self) -> None:
+        """Serve what the files hold, if that has changed and is valid."""
         version = self._version()
         if version == self._served:
             return
@@ -111,22 +100,10 @@ class Certificates:
             self._warned = str(error)
             return
         self._served, self._warned = version, ""
-        self._expires = _expires(self._files[0])
         log.info("new connections use the renewed TLS certificate of %s", self._files[0])
 
     def _version(self) -> list[tuple[int, ...] | None]:
         return [_stamp(path) for path in self._files]
-
-
-def _expires(cert_file: str) -> datetime | None:
-    """When a chain's own certificate, its first, expires; None: it says no such date."""
-    # Imported only where it is needed: it takes time.
-    from cryptography.x509 import load_pem_x509_certificates  # noqa: PLC0415
-
-    try:
-        return load_pem_x509_certificates(Path(cert_file).read_bytes())[0].not_valid_after_utc
-    except (OSError, ValueError):  # replaced meanwhile, or OpenSSL is less strict
-        return None
 
 
 def _stamp(path: str) -> tuple[int, ...] | None:
@@ -397,11 +374,8 @@ async def serve(
     tasks = [asyncio.create_task(supervisor.send_watchdog(ailment), name="watchdog")]
     server.config.load()
     if server.config.ssl is not None:
-        # Renewed when its files change, and at once at SIGHUP.
         certificates = Certificates(settings.tls_cert, settings.tls_key, server.config.ssl)
-        asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, certificates.look)
         tasks.append(asyncio.create_task(certificates.watch(), name="certificates"))
-    # Last: a certificate's renewal that sees the address may send SIGHUP, which ends others.
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     supervisor.ready(f"serving {url}")
     try:

@@ -18,7 +18,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
-from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.serving.admission import RateLimit
 from lupin_bridge.serving.connections import (
     CLOSE_GRACE_S,
     CONNECTION_KEY,
@@ -150,7 +150,6 @@ class Connection(WebSocketsSansIOProtocol, SmallReads):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
-        self.address = ""
         # uvicorn's time-out for the client's answer to a close, by default ten seconds.
         self.close_timeout = CLOSE_GRACE_S
         self.on_writable: Callable[[], None] | None = None
@@ -166,8 +165,6 @@ class Connection(WebSocketsSansIOProtocol, SmallReads):
         Over TLS, asyncio buffers another 64 kB below the limit that can be set.
         """
         super().connection_made(transport)
-        if self.client is not None:
-            self.address = client_key(self.client[0])
         # uvicorn does so later. Over TLS something may be unsent when the limits are set: the HTTP
         # protocol would be notified, wait for a reader not its own, and cut the client off.
         self.transport.set_protocol(self)

@@ -37,7 +37,6 @@ class SignIn(_Given):
 
     name: str
     password: str
-    ends_others: bool = Field(default=False, description="sign this name out everywhere else")
 
 
 class _Keys(_Given):
@@ -303,12 +302,6 @@ class ReportCounts(Contract):
     tags_scanned: int = Field(description="those of them with a scan in it")
 
 
-class ReportSilence(Period):
-    """A period without an attempt; a tag's silence excludes those of the whole greenhouse."""
-
-    tag_id: str = Field(description="empty: the whole greenhouse")
-
-
 class ReportExtreme(Contract):
     """The lowest or highest reading of a sensor."""
 
@@ -350,7 +343,7 @@ class ShiftReport(PastPeriod):
         description="active at any time in the period: first those active at its end; worst first"
     )
     notes: list[Note] = Field(description="newest first")
-    silences: list[ReportSilence] = Field(description="those of the greenhouse, then those of tags")
+    silences: list[Period] = Field(description="times without any attempt, oldest first")
     sensors: list[ReportSensor]
     never_scanned: list[str] = Field(description="tags without a scan in the period")
     left_out: ReportLeftOut

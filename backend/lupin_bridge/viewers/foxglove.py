@@ -14,7 +14,6 @@ older ones that could not be written are dropped.
 from __future__ import annotations
 
 import asyncio
-import logging
 import struct
 import uuid
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
@@ -44,7 +43,6 @@ _MAX_ID: Final = 2**32 - 1
 _ERROR: Final = 2
 
 _MESSAGE_DATA: Final = 1
-_TIME: Final = 2
 
 _REFUSED: Final = "refused: lupin-twin only reads, expected subscribe or unsubscribe"
 
@@ -103,13 +101,13 @@ def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
 # --- outgoing ---------------------------------------------------------------------------------
 
 
-def server_info(session_id: str, *, has_time: bool) -> bytes:
+def server_info(session_id: str) -> bytes:
     """The first message; `session_id` changes with a restart."""
     return orjson.dumps(
         {
             "op": "serverInfo",
             "name": "lupin-twin",
-            "capabilities": ["time"] if has_time else [],
+            "capabilities": [],
             "supportedEncodings": [],
             "sessionId": session_id,
         }
@@ -144,8 +142,6 @@ def unadvertise(ids: Iterable[int]) -> bytes:
 
 # --- one client's session -------------------------------------------------------------------------
 
-log = logging.getLogger(__name__)
-
 
 @dataclass(slots=True)
 class Counts:
@@ -165,14 +161,13 @@ class Reaction:
 
 
 class Session:
-    """The state of one connection; `time_ns` is simulated time that is still to be sent."""
+    """The state of one connection."""
 
     def __init__(self, counts: Counts) -> None:
         self._counts = counts
         self._subscriptions: dict[int, Channel] = {}
         self._advertised: dict[int, Channel] = {}
         self._waiting: dict[int, Sample] = {}
-        self.time_ns: int | None = None
 
     def receive(self, message: str | bytes) -> Reaction:
         """Take one message from the client."""
@@ -220,10 +215,6 @@ class Session:
 
     def next(self) -> tuple[bytes, bytes] | None:
         """What is to be written next, as a binary message in two parts; None: nothing waits."""
-        if self.time_ns is not None:
-            head = struct.pack("<BQ", _TIME, max(0, self.time_ns))
-            self.time_ns = None
-            return head, b""
         if not self._waiting:
             return None
         subscription_id = next(iter(self._waiting))
@@ -265,53 +256,35 @@ def _errors(errors: list[str]) -> tuple[bytes, ...]:
 
 # How often layers are looked for, s.
 POLL_S: Final = 2.0
-# How often simulated time is sent, s: often enough to look smooth.
-TICK_S: Final = 0.1
 MAX_LAYERS: Final = 64
 
 
 class Offer:
-    """What clients may subscribe to; belongs to the event loop.
-
-    `channels` are by id. `has_time`: time is simulated.
-    """
+    """What clients may subscribe to, by id; belongs to the event loop."""
 
     def __init__(self, source: TwinSource) -> None:
         self.session_id = uuid.uuid4().hex
         self.channels: dict[int, Channel] = {}
-        self.has_time = False
-        self._sent_ns: int | None = None
         self.counts = Counts()
         self._source = source
         self._ids = count(1)
-        self._missing: set[str] = set()
-        self._followers: dict[Callable[[int | None], None], None] = {}
-        self._following: tuple[Periodic, ...] = ()
+        self._followers: dict[Callable[[], None], None] = {}
+        self._following: Periodic
         self._looking: Shared[None] = Shared()
 
     @asynccontextmanager
-    async def followed(self, on_news: Callable[[int | None], None]) -> AsyncIterator[None]:
-        """Have `on_news` called when channels change (None), or simulated time does (ns).
-
-        The last time sent to others is passed at once: if time stands still, none may follow.
-        """
-        self._followers[on_news] = None
+    async def followed(self, on_change: Callable[[], None]) -> AsyncIterator[None]:
+        """Have `on_change` called when channels change."""
+        self._followers[on_change] = None
         if len(self._followers) == 1:
-            self._sent_ns = None
-            self._following = (
-                Periodic(self.look, POLL_S, "foxglove's layers"),
-                Periodic(self._send_time, TICK_S, "foxglove's time"),
-            )
-            for each in self._following:
-                each.start()
-        elif self._sent_ns is not None:
-            on_news(self._sent_ns)
+            self._following = Periodic(self.look, POLL_S, "foxglove's layers")
+            self._following.start()
         try:
             yield
         finally:
-            del self._followers[on_news]
+            del self._followers[on_change]
             if not self._followers:
-                await asyncio.gather(*(each.stop() for each in self._following))
+                await self._following.stop()
 
     async def look(self) -> None:
         """Bring the channels up to date; concurrent callers share one look."""
@@ -322,42 +295,20 @@ class Offer:
         wanted = list(topics_of(names))
         try:
             published = await self._source.relay.published(partial(_is_layer, names))
-            self.has_time = (await self._source.relay.time()).is_simulated
         except TwinUnavailableError:
             published = {}
         wanted += [Topic(kind, "", name) for name, kind in sorted(published.items())[:MAX_LAYERS]]
         known = {channel.topic: channel for channel in self.channels.values()}
         found = [known.get(topic) or await self._channel(topic) for topic in wanted]
-        channels = {channel.id: channel for channel in found if channel is not None}
+        channels = {channel.id: channel for channel in found}
         if channels != self.channels:
             self.channels = channels
-            self._notify(None)
+            for on_change in list(self._followers):
+                on_change()
 
-    async def _channel(self, topic: Topic) -> Channel | None:
-        if topic.type_name in self._missing:
-            return None
-        try:
-            text = await asyncio.to_thread(schema_text, topic.type_name)
-        except LookupError as error:
-            self._missing.add(topic.type_name)
-            log.warning("%s is not offered to viewers: %s", topic.name, error)
-            return None
+    async def _channel(self, topic: Topic) -> Channel:
+        text = await asyncio.to_thread(schema_text, topic.type_name)
         return Channel(next(self._ids), topic, text)
-
-    async def _send_time(self) -> None:
-        if not self.has_time:
-            return
-        try:
-            now_ns = (await self._source.relay.time()).now_ns
-        except TwinUnavailableError:  # the ROS thread has ended, which the status reports
-            return
-        if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
-            self._sent_ns = now_ns
-            self._notify(now_ns)
-
-    def _notify(self, time_ns: int | None) -> None:
-        for on_news in list(self._followers):
-            on_news(time_ns)
 
 
 def _is_layer(names: TwinNames, topic: str, type_name: str) -> bool:

@@ -1,7 +1,7 @@
 """The read-only part of the rosbridge v2 protocol: parses requests, and makes replies. Pure.
 
 `/rosbridge` serves `subscribe` and `unsubscribe` (the twin's topics), and `call_service` (GetField
-and a little of rosapi): what roslib clients use to read, with `args` as an object. Any other
+and rosapi's list of topics): what roslib clients use to read, with `args` as an object. Any other
 operation is refused with a `status` message that names it.
 
 How the options fit our policy, which keeps only the newest for a client:
@@ -13,12 +13,10 @@ How the options fit our policy, which keeps only the newest for a client:
 - `id` is a string or an integer. null counts as not given, everywhere. Members that are not named
   here are ignored, as rosbridge does.
 
-A call of GetField is only checked here, and computed by the caller. Calls of rosapi are answered at
-once, from the known names. `type`, if a call has it, is checked only for GetField: rosapi's
-packages have other names in ROS 1 than in ROS 2, and rosbridge does not check it at all.
+A call of GetField is only checked here, and computed by the caller. `type`, if a call has it, is
+checked only for GetField: rosapi's packages have other names in ROS 1 than in ROS 2.
 
-In JSON, arrays of bytes (uint8, char) are base64, all others lists; a number that is not finite is
-null. A time is `{sec, nanosec}`, as any other message.
+In JSON, a number that is not finite is null. A time is `{sec, nanosec}`, as any other message.
 
 https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
 """
@@ -26,8 +24,7 @@ https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
 from __future__ import annotations
 
 import re
-from binascii import b2a_base64
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 from typing import Annotated, Any, Final, Literal
 
@@ -166,26 +163,20 @@ def _id_member(message_id: Id) -> dict[str, Id]:
 Converter = Callable[[Any], Any]
 
 _ARRAY: Final = re.compile(r"sequence<(?P<kind>[\w/]+)(?:, \d+)?>|(?P<of>[\w/]+)\[\d+\]")
-_BYTES: Final = frozenset(("uint8", "char"))
 _NUMBERS: Final = frozenset(
-    ("uint16", "uint32", "uint64", "int8", "int16", "int32", "int64", "float", "double")
+    (
+        *("uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64"),
+        *("float", "double"),
+    )
 )
 # Numbers per call of orjson: a millisecond's worth.
 _PART: Final = 65_536
-_PLAIN: Final = _NUMBERS | _BYTES | {"boolean"}
+_PLAIN: Final = _NUMBERS | {"boolean"}
 
 
 def json_of(message: Any) -> bytes:
-    """The message in JSON.
-
-    Raises:
-        ValueError: a text that is no Unicode.
-
-    """
-    try:
-        return orjson.dumps(_message(message))
-    except TypeError as error:
-        raise ValueError(str(error)) from error
+    """The message in JSON."""
+    return orjson.dumps(_message(message))
 
 
 def _array(values: Any) -> orjson.Fragment:
@@ -221,8 +212,6 @@ def _converter(kind: str) -> Converter:
     if found is None:
         return _one(kind)
     of = found["kind"] or found["of"]
-    if of in _BYTES:
-        return lambda values: b2a_base64(bytes(values), newline=False).decode("ascii")
     if of in _NUMBERS:
         return _array
     one = _one(of)
@@ -238,15 +227,7 @@ def _one(kind: str) -> Converter:
 
 
 FIELD_TYPE: Final = "lupin_msgs/srv/GetField"
-# The types of rosapi's services, by name.
-_ROSAPI: Final = {
-    "/rosapi/topics": "Topics",
-    "/rosapi/topics_for_type": "TopicsForType",
-    "/rosapi/topic_type": "TopicType",
-    "/rosapi/services": "Services",
-    "/rosapi/services_for_type": "ServicesForType",
-    "/rosapi/service_type": "ServiceType",
-}
+TOPICS_SERVICE: Final = "/rosapi/topics"
 
 
 class _FieldArgs(BaseModel):
@@ -283,13 +264,14 @@ def answer(call: CallService, names: TwinNames) -> FieldCall | bytes:
     try:
         if service == names.field_service:
             return _field_call(call)
-        if service in _ROSAPI:
-            return orjson.dumps(_rosapi(service, call.args, names))
+        if service == TOPICS_SERVICE:
+            known = {topic.name: topic.type_name for topic in topics_of(names)}
+            return orjson.dumps({"topics": list(known), "types": list(known.values())})
     except Refused as error:
         raise Refused(str(error), call.id, call.service) from None
-    known = ", ".join((names.field_service, *_ROSAPI))
     raise Refused(
-        f"service {shown(call.service)} is not served, expected one of {known}",
+        f"service {shown(call.service)} is not served, expected {names.field_service} or"
+        f" {TOPICS_SERVICE}",
         call.id,
         call.service,
     )
@@ -302,28 +284,3 @@ def _field_call(call: CallService) -> FieldCall:
         return call, FieldQuery(**model_of(_FieldArgs, call.args).model_dump())
     except ValueError as error:
         raise Refused(f"args.{error}") from None
-
-
-def _rosapi(service: str, args: Mapping[str, Any], names: TwinNames) -> dict[str, Any]:
-    """The answer of rosapi; for unknown names and types it is empty, which is no error."""
-    of = {name: str(value) for name, value in args.items()}
-    topics = {topic.name: topic.type_name for topic in topics_of(names)}
-    services = {names.field_service: FIELD_TYPE}
-    services |= {name: f"rosapi_msgs/srv/{kind}" for name, kind in _ROSAPI.items()}
-    match service:
-        case "/rosapi/topics":
-            return {"topics": list(topics), "types": list(topics.values())}
-        case "/rosapi/topics_for_type":
-            return {"topics": _of_type(topics, of.get("type", ""))}
-        case "/rosapi/topic_type":
-            return {"type": topics.get(absolute(of.get("topic", "")), "")}
-        case "/rosapi/services":
-            return {"services": list(services)}
-        case "/rosapi/services_for_type":
-            return {"services": _of_type(services, of.get("type", ""))}
-        case _:
-            return {"type": services.get(absolute(of.get("service", "")), "")}
-
-
-def _of_type(names: Mapping[str, str], type_: str) -> list[str]:
-    return [name for name, known in names.items() if is_type(type_, known)]

@@ -37,7 +37,6 @@ export type RobotFrame = Schemas['RobotFrame'];
 export type Frame = StateFrame | DeltaFrame | StatusFrame | Schemas['AlarmsFrame'] | RobotFrame;
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
-export type PastAttempt = Schemas['PastAttempt'];
 export type TagHistory = Schemas['TagHistory'];
 export type History = Schemas['History'];
 export type Timeline = Schemas['Timeline'];

@@ -10,7 +10,6 @@ import {
   differenceShown,
   differenceText,
   divergingShade,
-  otherMoment,
   symmetricRange,
   type TagThen,
   trendOf,
@@ -18,11 +17,6 @@ import {
 
 const field = (values: readonly number[], over: Partial<Field> = {}): Field =>
   fieldWith([values], { resolution: 0.1, valueMin: 0, valueMax: 0, sampleCount: 3, ...over });
-
-test('the other moment is so long before the one that is shown, or one for ever', () => {
-  expect(otherMoment({ by: 'ago', seconds: 86_400 }, 100_000)).toBe(13_600);
-  expect(otherMoment({ by: 'moment', at: 500 }, 100_000)).toBe(500);
-});
 
 describe('a difference', () => {
   test('is the field that is shown less the other, and not known where either is not', () => {

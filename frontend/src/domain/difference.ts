@@ -7,16 +7,11 @@ import type { Ranges, Sensor } from './sensors';
 import { secondsOf } from './time';
 import type { Tag } from './twin';
 
-/** What the shown moment is compared with: a number of seconds before it, or a fixed moment. */
-export type Compare =
-  { readonly by: 'ago'; readonly seconds: number } | { readonly by: 'moment'; readonly at: number };
+/** How many days before the shown moment the other one is. */
+export const COMPARED = { day: 1, week: 7 } as const;
+export type Compare = keyof typeof COMPARED;
 
 export const DAY_S = 86_400;
-export const WEEK_S = 7 * DAY_S;
-
-/** ROS seconds. */
-export const otherMoment = (compare: Compare, shownAt: number): number =>
-  compare.by === 'moment' ? compare.at : shownAt - compare.seconds;
 
 /**
  * The shown field minus the other, cell by cell, on one grid; a cell is known only if both are.

@@ -140,7 +140,3 @@ export const toShown = ({ factor, offset }: Sensor, value: number): number =>
 
 /** A difference of two values as shown: without the offset of 32. */
 export const differenceToShown = ({ factor }: Sensor, value: number): number => value * factor;
-
-/** The inverse of `toShown`, for numbers that the operator types. */
-export const fromShown = ({ factor, offset }: Sensor, value: number): number =>
-  (value - offset) / factor;

@@ -137,7 +137,7 @@ export function sharedJudgement(before: Judgement | null, now: Judgement): Judge
 /** Longest name of an undeclared sensor or kind, characters. */
 const LONGEST_NAME = 32;
 /** A longer name gives way to its abbreviation, if it has one. */
-const LONG_NAME = 20;
+const LONG_NAME = 19;
 
 /** A sensor's name in sentences and headings. */
 export const nameOf = ({ label }: Sensor): string =>
@@ -167,11 +167,9 @@ export function reasonText(
     const reading = beyondLimitText(sensor, reason.value, edge);
     // "Just below 350" names the limit itself.
     const isNear = reading !== readingText(sensor, reason.value);
-    const held = heldText(reason, (each) => (isNear ? null : valueText(sensor, each)));
-    const side = S.reasons.sides[sideOf(reason)];
-    const limit = held ?? (isNear ? null : `${side} ${valueText(sensor, reason.limit)}`);
-    const text = `${label} ${reading}${ago}${limit === null ? '' : `, ${limit}`}`;
-    return isMarked || held ? text : ratedText(text, reason.verdict);
+    const limit = isNear ? '' : `, ${limitText(reason, (each) => valueText(sensor, each))}`;
+    const text = `${label} ${reading}${ago}${limit}`;
+    return isMarked ? text : ratedText(text, reason.verdict);
   }
   switch (kind) {
     case 'range':
@@ -211,21 +209,18 @@ export function reasonText(
 export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
-/** For a value that is back in its range, what it must pass; null: it is beyond its limit. */
-const heldText = (reason: OfRange, text: (value: number) => string | null): string | null => {
-  const { release = null, verdict } = reason;
-  if (release === null) return null;
-  const isBelow = sideOf(reason) === 'above';
-  return S.reasons.heldUntil(S.health[verdict].toLowerCase(), isBelow, text(release));
+/** Side and limit; for a value that is back in its range, what it must pass. */
+const limitText = (reason: OfRange, text: (value: number) => string): string => {
+  const { must, sides } = S.reasons;
+  const { release = null, limit } = reason;
+  const side = sideOf(reason);
+  return release === null ? `${sides[side]} ${text(limit)}` : must[side](text(release));
 };
 
 /** Names sensor, side and limit, or what the value has yet to pass; without the value, which changes. */
 export function beyondText(sensors: Catalogue, reason: OfRange): string {
   const sensor = sensors.named(reason.sensor);
-  const text = (value: number): string => readingText(sensor, value);
-  const side = S.reasons.sides[sideOf(reason)];
-  const held = heldText(reason, text);
-  return `${nameOf(sensor)}${held ? `, ${held}` : ` ${side} ${text(reason.limit)}`}`;
+  return `${nameOf(sensor)} ${limitText(reason, (value) => readingText(sensor, value))}`;
 }
 
 /** What to do about it; for what is healthy again, what its alarm still waits for. */

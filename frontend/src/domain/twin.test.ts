@@ -109,20 +109,6 @@ describe('snapshot', () => {
     expect([first.tags[0]?.isObserved, later.tags[0]?.isObserved]).toEqual([false, true]);
   });
 
-  test('names the tags that were observed since the last one', () => {
-    const a = wireTag({ tag_id: 'a' });
-    const b = wireTag({ tag_id: 'b' });
-    const found = wireTag({
-      tag_id: 'c',
-      stale_seconds: null,
-      last_observed: { sec: 0, nanosec: 0 },
-    });
-    const first = snapshotOf(stateFrame([a, b]), 0, null);
-    expect(first.fresh).toEqual([]);
-    const again = { ...b, last_observed: { sec: 101, nanosec: 0 } };
-    expect(snapshotOf(stateFrame([a, again, found]), 1, first).fresh).toEqual(['b']);
-  });
-
   test('a frame that changes nothing keeps the very list; one that changes a tag, the others', () => {
     const wires = ['1', '2', '10'].map((tag_id) => wireTag({ tag_id }));
     const first = snapshotOf(stateFrame(wires, { sec: 1 }), 1_000, null);

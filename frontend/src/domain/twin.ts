@@ -22,8 +22,6 @@ export interface Snapshot {
   readonly at: WireTime;
   /** When this state was new, ms on the browser's monotonic clock. */
   readonly takenAt: number;
-  /** Tags observed since the snapshot before. */
-  readonly fresh: readonly string[];
   /** Whether it is complete; else the journal lacks data of that time. */
   readonly isWhole: boolean;
 }
@@ -178,7 +176,6 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
     tags,
     revision: latest.revision,
     ...state,
-    fresh: before && tags !== before.tags ? freshTags(known, tags) : [],
     isWhole: latest.isWhole ?? true,
   };
 }
@@ -212,15 +209,6 @@ function inOrder(
     if (now.size === before.length) return before.map((tag) => now.get(tag.id) ?? tag);
   }
   return [...tags].sort((a, b) => compareIds(a.id, b.id));
-}
-
-function freshTags(before: ReadonlyMap<string, Tag>, now: readonly Tag[]): string[] {
-  return now
-    .filter(({ id, isObserved, wire }) => {
-      const was = before.get(id)?.wire.last_observed;
-      return isObserved && !equal(was, wire.last_observed);
-    })
-    .map((tag) => tag.id);
 }
 
 const collator = new Intl.Collator('en', { numeric: true });

@@ -12,10 +12,8 @@ import {
   drawLabels,
   drawMark,
   drawPins,
-  drawPulses,
   labelRequests,
   pinRadius,
-  PULSE_MS,
 } from './pins';
 import type { Pin } from './scene';
 import { type Pen, Sprites } from './surface';
@@ -196,19 +194,6 @@ describe('overlay', () => {
     const context = new FakeContext();
     return { context, pen: penOn(context, { view, size: { width: 101, height: 61 } }) };
   };
-
-  test('a pulse grows and vanishes', () => {
-    const { context, pen } = set();
-    const at = mapPoint(1, 1);
-    for (const now of [0, PULSE_MS / 2, PULSE_MS]) {
-      drawPulses(pen, [{ at, since: 0 }], now);
-    }
-    const arcs = context.named('arc');
-    const radii = arcs.map(({ args }) => args[2] as number);
-    expect(radii).toEqual([...radii].sort((a, b) => a - b));
-    expect(arcs.map(({ state }) => state['globalAlpha'])).toEqual([1, 0.5, 0]);
-    expect(arcs[0]?.args.slice(0, 2)).toEqual([50, 50]);
-  });
 
   const path = (context: FakeContext): string =>
     (context.named('stroke')[0]?.args[0] as { d: string } | undefined)?.d ?? '';

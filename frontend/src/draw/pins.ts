@@ -252,34 +252,6 @@ export function drawLabels(pen: Pen, labels: readonly PlacedLabel[]): void {
   }
 }
 
-/** How long the ring of a new observation grows, ms. */
-export const PULSE_MS = 1_200;
-
-export interface Pulse {
-  readonly at: MapPoint;
-  /** ms on the monotonic clock. */
-  readonly since: number;
-}
-
-export function drawPulses(
-  { context, view, colour }: Pen,
-  pulses: readonly Pulse[],
-  now: number,
-): void {
-  const radius = pinRadius(view.scale);
-  context.strokeStyle = colour('accent');
-  context.lineWidth = 2;
-  for (const { at, since } of pulses) {
-    const share = Math.min(1, Math.max(0, (now - since) / PULSE_MS));
-    const { x, y } = toCanvas(view, at);
-    context.globalAlpha = 1 - share;
-    context.beginPath();
-    context.arc(x, y, radius + 2 + share * 20, 0, 2 * Math.PI);
-    context.stroke();
-  }
-  context.globalAlpha = 1;
-}
-
 /** In the accent colour, with a halo that separates it from any colour below. */
 function drawOutlined({ context, colour }: Pen, lines: Path2D, halo: number, width: number): void {
   context.strokeStyle = colour('map-halo');

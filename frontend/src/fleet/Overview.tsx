@@ -178,7 +178,12 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
   return (
     <div role="alert" className="fleet-trouble" hidden={!text}>
       {text && <strong>{text}</strong>}
-      {detail && <span lang="en">{detail}</span>}
+      {detail && (
+        <details>
+          <summary>{S.more}</summary>
+          <span lang="en">{detail}</span>
+        </details>
+      )}
     </div>
   );
 }

@@ -8,8 +8,6 @@ export interface MapActions {
   /** By a share of the view's size; x to the right, y down. */
   readonly panBy: (x: number, y: number) => void;
   readonly show: (tagId: string) => void;
-  /** Shows the layers as on paper while `draw` runs: without animation and pointer marks. */
-  readonly take: (draw: () => void) => void;
 }
 
 /** Null: the page shows no map. */

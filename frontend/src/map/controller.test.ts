@@ -8,7 +8,7 @@ import { NOTHING } from '../store/fetcher';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { pinUnderMouse, pointedAt, theMap } from './commands';
+import { pinUnderMouse, pointedAt } from './commands';
 import { runMap } from './controller';
 import { startGestures } from './gestures';
 
@@ -18,7 +18,6 @@ let pins: HTMLCanvasElement;
 let overlay: HTMLCanvasElement;
 let stop: () => void;
 let frames: FrameRequestCallback[];
-let calm: boolean;
 
 const fail = (error: unknown): void => {
   throw error;
@@ -44,10 +43,7 @@ const start = (isFixed = false): void => {
 const paint = (): void => {
   for (const frame of frames.splice(0)) frame(performance.now());
 };
-const view = (): View => {
-  const [x = 0, y = 0, scale = 0] = (overlay.dataset['view'] ?? '').split(',').map(Number);
-  return { x, y, scale };
-};
+const view = (): View => store.get().viewport.view;
 const drawn = (name: string): number => FakeContext.recordOf(overlay)?.named(name).length ?? 0;
 
 /** jsdom has no PointerEvent of its own in every version; a mouse event carries all that counts. */
@@ -66,7 +62,6 @@ beforeEach(() => {
   frames = [];
   pointedAt.set(null);
   pinUnderMouse.set(null);
-  calm = false;
   vi.stubGlobal('requestAnimationFrame', (frame: FrameRequestCallback) => frames.push(frame));
   vi.stubGlobal('cancelAnimationFrame', () => {
     frames.splice(0);
@@ -86,10 +81,6 @@ beforeEach(() => {
       }
     },
   );
-  const matchMedia = window.matchMedia.bind(window);
-  vi.spyOn(window, 'matchMedia').mockImplementation((query) =>
-    Object.assign(matchMedia(query), { matches: query.includes('reduced-motion') && calm }),
-  );
   element = document.createElement('div');
   document.body.append(element);
   showTags([tagAt('a', 1, 1), tagAt('b', 3, 2)]);
@@ -104,66 +95,8 @@ const place = (x: number, y: number): readonly [number, number] => {
   return [at.x, at.y];
 };
 
-const observeAgain = (): void => {
-  const tags = [tagAt('a', 1, 1, 200), tagAt('b', 3, 2)];
-  const latest = stateFrame(tags, { sec: 5_000, revision: 'later' });
-  receive(withState(latest, performance.now()));
-  paint();
-};
-
-describe('pulses', () => {
-  // They are so short that a busy machine may miss them.
-  beforeEach(() => {
-    vi.useFakeTimers({ toFake: ['performance'] });
-  });
-  afterEach(() => {
-    vi.useRealTimers();
-  });
-
-  test('a fresh observation sends out a ring', () => {
-    start();
-    observeAgain();
-    expect(drawn('arc')).toBe(1);
-  });
-
-  test('a picture of the map has no ring, and the screen has it again behind it', () => {
-    start();
-    observeAgain();
-    let rings = -1;
-    const take = (): void => {
-      rings = drawn('arc') - 1;
-    };
-    theMap.get()?.take(take);
-    expect(rings).toBe(0);
-    expect(drawn('arc')).toBe(1);
-    paint();
-    expect(drawn('arc')).toBe(2);
-  });
-
-  test('not for those who want less motion', () => {
-    calm = true;
-    start();
-    observeAgain();
-    expect(drawn('arc')).toBe(0);
-  });
-
-  test('not where the pins are switched off', () => {
-    start();
-    act(withLayer('pins', false));
-    observeAgain();
-    expect(drawn('arc')).toBe(0);
-  });
-
-  test('not on paper', () => {
-    start();
-    window.dispatchEvent(new Event('beforeprint'));
-    observeAgain();
-    expect(drawn('arc')).toBe(0);
-    window.dispatchEvent(new Event('afterprint'));
-    expect(drawn('arc')).toBe(1);
-  });
-
-  test('the mark of the mouse neither', () => {
+describe('on paper', () => {
+  test('there is no mark of the mouse', () => {
     start();
     const strokesOf = (happen: () => void): number => {
       const before = drawn('stroke');
@@ -299,7 +232,9 @@ test('everything is in sight, the heat map too', () => {
   // Another sensor's heat map, on the same grid, is being fetched.
   const before = view();
   receive(withField(NOTHING));
-  observeAgain();
+  const tags = [tagAt('a', 1, 1, 200), tagAt('b', 3, 2)];
+  receive(withState(stateFrame(tags, { sec: 5_000, revision: 'later' }), performance.now()));
+  paint();
   expect(view()).toEqual(before);
 });
 

@@ -1,6 +1,6 @@
 /** Connects the map's canvases to the store: redraws only what changed, once per frame. */
 import { now } from '../clock';
-import { pinRadius, type Pulse, PULSE_MS } from '../draw/pins';
+import { pinRadius } from '../draw/pins';
 import type { Pin } from '../draw/scene';
 import {
   type Box,
@@ -22,7 +22,7 @@ import {
   selectRange,
   selectSensor,
 } from '../store/derived';
-import { selectLatest, selectShown, selectTag, type Shown } from '../store/moment';
+import { selectLatest, selectShown, selectTag } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
@@ -55,12 +55,9 @@ export function runMap(
     }
   };
   const painter = new Painter(canvases);
-  const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
   const dirty = new Set<Part>();
   let frame = 0;
-  let pulses: readonly Pulse[] = [];
   let crosshair = false;
-  let isTaken = false;
   /** The parts of the map below other elements. */
   let covered: readonly Box[] = [];
   let drawn = store.get();
@@ -86,7 +83,7 @@ export function runMap(
     cancelAnimationFrame(frame);
     frame = 0;
     const live = store.get();
-    const onPaper = isPrinting() || isTaken;
+    const onPaper = isPrinting();
     const state = onPaper ? { ...live, view: { ...live.view, hovered: null } } : live;
     const { view } = live.viewport;
     const at = now();
@@ -100,14 +97,8 @@ export function runMap(
       painter.paintPins(state, view, at, parts.has('pins'), boxes, marksOnMap.get());
     }
     if (parts.has('overlay') || parts.has('view')) {
-      pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
-      painter.paintOverlay(state, view, {
-        pulses: onPaper ? [] : pulses,
-        now: at,
-        crosshair: crosshair && !onPaper,
-      });
+      painter.paintOverlay(state, view, crosshair && !onPaper);
     }
-    if (pulses.length > 0) spoil('overlay');
   });
 
   const middle = (): CanvasPoint => {
@@ -125,11 +116,6 @@ export function runMap(
     const last = selectShown(before);
     lastField = house.field.value ?? lastField;
     const changedTags = house.snapshot?.tags !== last.snapshot?.tags;
-    // Changing the moment makes no news.
-    const isNews = house.moment === null && last.moment === null;
-    if (changedTags && house.snapshot && isNews && !calm.matches) {
-      pulses = [...pulses, ...newPulses(house)];
-    }
     const sameMap = house.map === last.map;
     const stillChanged =
       !sameMap ||
@@ -275,14 +261,6 @@ export function runMap(
     panBy: (x, y) => {
       camera.panBy(x, y);
     },
-    take: (draw) => {
-      isTaken = true;
-      spoil('pins', 'overlay');
-      paint();
-      draw();
-      isTaken = false;
-      spoil('pins', 'overlay');
-    },
   };
   theMap.set(actions);
 
@@ -374,12 +352,4 @@ export function runMap(
     cancelAnimationFrame(frame);
     camera.destroy();
   };
-}
-
-function newPulses({ snapshot }: Shown): Pulse[] {
-  const fresh = new Set(snapshot?.fresh);
-  const since = now();
-  return (snapshot?.tags ?? []).flatMap((tag) =>
-    tag.at && fresh.has(tag.id) ? [{ at: tag.at, since }] : [],
-  );
 }

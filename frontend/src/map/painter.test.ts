@@ -71,14 +71,6 @@ describe('painter', () => {
     expect(first).toBe(second);
   });
 
-  test('a pulse touches its own canvas alone', () => {
-    const pulses = [{ at: store.get().twin.latest.snapshot?.tags[0]?.at, since: 0 }] as never;
-    painter.paintOverlay(store.get(), view, { pulses, now: 10, crosshair: false });
-    expect(named(canvases.overlay, 'arc')).toHaveLength(1);
-    expect(calls(canvases.still)).toHaveLength(0);
-    expect(calls(canvases.pins)).toHaveLength(0);
-  });
-
   test('what is not known is hatched below the field, and outlined above it', () => {
     show('field', 'unknown');
     painter.paintStill(store.get(), view, 0, true);
@@ -147,7 +139,7 @@ describe('painter', () => {
 
   test('the chosen and the hovered tag are marked', () => {
     act(withTag('1'));
-    painter.paintOverlay(store.get(), view, { pulses: [], now: 0, crosshair: false });
+    painter.paintOverlay(store.get(), view, false);
     expect(named(canvases.overlay, 'stroke').length).toBeGreaterThan(0);
   });
 

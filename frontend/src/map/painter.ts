@@ -11,11 +11,9 @@ import {
   drawLabels,
   drawMark,
   drawPins,
-  drawPulses,
   labelFont,
   labelHeight,
   labelRequests,
-  type Pulse,
 } from '../draw/pins';
 import { coloursOf, type Colours } from '../draw/colours';
 import {
@@ -80,7 +78,7 @@ interface RoomAt extends Room {
 }
 
 /**
- * Draws the state on three canvases: still layers, pins, and animations. It caches only what is
+ * Draws the state on three canvases: still layers, pins, and the pointer's marks. It caches only what is
  * expensive (coloured pictures, sprites, label places), each by its input data.
  */
 export class Painter {
@@ -238,23 +236,14 @@ export class Painter {
     drawLabels(pen, this.#labels(scene, scale, state.view.selected, this.#widths, room));
   }
 
-  paintOverlay(
-    state: AppState,
-    view: View,
-    moving: {
-      readonly pulses: readonly Pulse[];
-      readonly now: number;
-      readonly crosshair: boolean;
-    },
-  ): void {
+  paintOverlay(state: AppState, view: View, hasCrosshair: boolean): void {
     const pen = this.#penOn(this.canvases.overlay, view);
-    if (state.view.layers.has('pins')) drawPulses(pen, moving.pulses, moving.now);
     const { selected, hovered } = state.view;
     for (const tagId of new Set([hovered, selected])) {
       const at = tagId === null ? null : selectTag(state, tagId)?.at;
       if (at) drawMark(pen, at, tagId === selected);
     }
-    if (moving.crosshair) drawCrosshair(pen);
+    if (hasCrosshair) drawCrosshair(pen);
   }
 
   hasFaded(state: AppState, now: number): boolean {

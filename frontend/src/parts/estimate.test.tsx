@@ -79,7 +79,7 @@ describe('readout', () => {
     point(0.5);
     // Until its clock starts, a part that is loaded late counts from the last tick before it.
     await waitFor(() => {
-      expect(text('readout-near')).toBe(`1 tag near, oldest reading 12${NBSP}min`);
+      expect(text('readout-near')).toBe(`1 tag nearby, oldest reading 12${NBSP}min ago`);
     });
     expect(text('readout')).toContain(`22.4${NBSP}±${NBSP}1.3${NBSP}°C`);
     point(1.5);
@@ -112,9 +112,6 @@ describe('legend', () => {
       '9 of 10 scans within the predicted range',
     );
     expect(text('estimate-key')).toContain(`Hatched colour: less certain than ±1.6${NBSP}°C`);
-    expect(text('legend')).toContain(
-      'Last day: 412 of 458 scans, last week: 2,900 of 3,200 scans.',
-    );
     expect(text('legend')).toContain('90 % interval');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();
   });

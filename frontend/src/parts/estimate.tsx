@@ -92,11 +92,9 @@ function predictionText({ day, share_day: share }: Grade): string {
 }
 
 function Prediction({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Element {
-  const { day, week } = grade;
   const least = Math.min(grade.share_day ?? 1, grade.share_week ?? 1);
   const details = [
     E.aboutText,
-    `${E.predictedDay(day.inside, day.scans)}, ${E.predictedWeek(week.inside, week.scans)}.`,
     ...(grade.fit_problem ? [`${E.fitProblem(shown(grade.fit_problem, 160))}.`] : []),
   ];
   return (

@@ -5,15 +5,7 @@ import { moveViewport } from '../store/app';
 import { marksOnMap, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import {
-  extended,
-  RobotFact,
-  RobotLayer,
-  robotText,
-  trailLines,
-  type TrailPoint,
-  wayAhead,
-} from './robot';
+import { extended, RobotFact, RobotLayer, robotText, trailLines, type TrailPoint } from './robot';
 
 const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
 const robot = {
@@ -156,56 +148,5 @@ describe('trail', () => {
         step: 5,
       },
     ]);
-  });
-});
-
-describe('way', () => {
-  const corner = [
-    [0, 0],
-    [4, 0],
-    [4, 4],
-  ];
-
-  test('is whole while nobody knows where the robot is', () => {
-    expect(wayAhead(corner, null)).toEqual(corner);
-  });
-
-  test.each([
-    [
-      'at its beginning',
-      { x: 0.1, y: 0 },
-      [
-        [0.1, 0],
-        [4, 0],
-        [4, 4],
-      ],
-    ],
-    [
-      'past the middle of a stretch',
-      { x: 3, y: 0.2 },
-      [
-        [3, 0.2],
-        [4, 0],
-        [4, 4],
-      ],
-    ],
-    [
-      'behind the corner',
-      { x: 4.1, y: 1 },
-      [
-        [4.1, 1],
-        [4, 4],
-      ],
-    ],
-  ])('goes on from the robot, %s', (_, place, left) => {
-    expect(wayAhead(corner, place)).toEqual(left);
-  });
-
-  test('of one point is a line to it, and of none is none', () => {
-    expect(wayAhead([[2, 2]], { x: 0, y: 0 })).toEqual([
-      [0, 0],
-      [2, 2],
-    ]);
-    expect(wayAhead([], { x: 1, y: 1 })).toEqual([[1, 1]]);
   });
 });

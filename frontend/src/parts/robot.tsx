@@ -48,7 +48,7 @@ export function RobotLayer(): ReactPortal | null {
   const looks = isLive === 'live' && isReceiving ? 'live' : 'old';
   const at = position && toCanvas(view, mapPoint(position.x, position.y));
   useClearOfLabels(at && [at.x - view.x, at.y - view.y], isLive === 'old');
-  const text = (points: readonly (readonly [number, number])[]): string =>
+  const text = (points: readonly (readonly number[])[]): string =>
     points.map((point) => point.join(',')).join(' ');
   const map = document.getElementById('map-view');
   if (!map) return null;
@@ -60,9 +60,7 @@ export function RobotLayer(): ReactPortal | null {
           {lines.map(({ points, step }, index) => (
             <polyline key={index} className="robot-trail" data-step={step} points={text(points)} />
           ))}
-          {plan && (
-            <polyline className="robot-plan" points={text(wayAhead(plan.points, position))} />
-          )}
+          {plan && <polyline className="robot-plan" points={text(plan.points)} />}
         </g>
       </svg>
       {position && at && (
@@ -259,36 +257,6 @@ export function trailLines(trail: readonly TrailPoint[], now: number | null) {
   return lines.filter(({ points }) => points.length > 1);
 }
 
-/** The rest of the plan, from the robot's position and the segment nearest to it. */
-export function wayAhead(
-  points: readonly (readonly number[])[],
-  position: { readonly x: number; readonly y: number } | null,
-): readonly (readonly [number, number])[] {
-  const way = points.map(([x = 0, y = 0]) => [x, y] as const);
-  if (!position) return way;
-  let nearest = Infinity;
-  let next = way.length - 1;
-  for (let index = 1; index < way.length; index++) {
-    const from = way[index - 1] ?? [0, 0];
-    const to = way[index] ?? [0, 0];
-    const distance = distanceTo(position, from, to);
-    if (distance < nearest) {
-      nearest = distance;
-      next = index;
-    }
-  }
-  return [[position.x, position.y], ...way.slice(next)];
-}
-
 type Place = readonly [number, number];
-
-/** Distance from a point to a line segment. */
-function distanceTo({ x, y }: { x: number; y: number }, from: Place, to: Place): number {
-  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
-  const length = dx * dx + dy * dy;
-  const along = length === 0 ? 0 : ((x - from[0]) * dx + (y - from[1]) * dy) / length;
-  const share = Math.min(1, Math.max(0, along));
-  return Math.hypot(x - from[0] - share * dx, y - from[1] - share * dy);
-}
 
 const apart = (a: TrailPoint, b: TrailPoint): number => Math.hypot(a.x - b.x, a.y - b.y);

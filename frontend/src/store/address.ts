@@ -1,9 +1,8 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
-import type { Compare } from '../domain/difference';
+import { COMPARED, type Compare } from '../domain/difference';
 import { equal, isPossible } from '../domain/twin';
 import { VERDICTS } from '../domain/health';
 import { type Period, PERIOD_KINDS } from '../domain/time';
-import type { Range } from '../domain/ramp';
 import type { Camera } from '../geometry/coordinates';
 import { act, store } from './app';
 import {
@@ -31,7 +30,7 @@ export function toFragment(view: Linked): string {
   if (view.moment !== null) parts.set('at', String(view.moment));
   if (view.period.kind === 'own') parts.set('period', `${view.period.from},${view.period.to}`);
   else if (isChosen(view.period)) parts.set('period', view.period.kind);
-  if (view.compare) parts.set('compare', compareText(view.compare));
+  if (view.compare) parts.set('compare', view.compare);
   for (const tagId of view.chart?.tagIds ?? []) parts.append(`chart.${view.chart?.by}`, tagId);
   if (view.sensor !== DEFAULT_VIEW.sensor) parts.set('sensor', view.sensor);
   if (view.selected !== null) parts.set('tag', view.selected);
@@ -41,9 +40,6 @@ export function toFragment(view: Linked): string {
   }
   if (view.heat !== DEFAULT_VIEW.heat) parts.set('heat', view.heat);
   if (view.colouring !== DEFAULT_VIEW.colouring) parts.set('colour', view.colouring);
-  for (const [sensor, { low, high }] of view.ranges) {
-    parts.set(rangeKey(sensor, view.sensor), `${short(low)},${short(high)}`);
-  }
   const layers = layersText(view.layers);
   if (layers !== layersText(DEFAULT_LAYERS)) parts.set('layers', layers);
   const { column, descending } = view.sort;
@@ -73,7 +69,6 @@ export function fromFragment(fragment: string): Linked {
     camera: cameraOf(numbers(parts.get('view'), 3)),
     heat: HEATS.find((kind) => kind === parts.get('heat')) ?? DEFAULT_VIEW.heat,
     colouring: parts.get('colour') === 'value' ? 'value' : 'ideal',
-    ranges: rangesOf(parts, sensor),
     layers: layers ? new Set(LAYERS.filter((layer) => layers.includes(layer))) : DEFAULT_LAYERS,
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
@@ -93,14 +88,8 @@ function periodOf(text: string | null): Period {
   return { kind: 'own', from, to };
 }
 
-/** Seconds before the shown moment, with a minus; or a moment, ROS seconds. */
-const compareText = (compare: Compare): string =>
-  String(compare.by === 'ago' ? -compare.seconds : compare.at);
-
 function compareOf(text: string | null): Compare | null {
-  const [value] = numbers(text, 1) ?? [];
-  if (value === undefined || Object.is(value, -0)) return null;
-  return value < 0 ? { by: 'ago', seconds: -value } : { by: 'moment', at: roundedMoment(value) };
+  return (Object.keys(COMPARED) as Compare[]).find((each) => each === text) ?? null;
 }
 
 const chartedIn = (parts: URLSearchParams): Charted | null => {
@@ -118,21 +107,6 @@ function sortOf(text: string | null): Sort {
   return column ? { column, descending } : DEFAULT_VIEW.sort;
 }
 
-/** "range" belongs to the sensor in view, "range.co2" to another. */
-const rangeKey = (sensor: string, inView: string): string =>
-  sensor === inView ? 'range' : `range.${sensor}`;
-
-function rangesOf(parts: URLSearchParams, inView: string): ReadonlyMap<string, Range> {
-  const ranges = new Map<string, Range>();
-  for (const [key, text] of parts) {
-    const sensor = key === 'range' ? inView : key.startsWith('range.') ? key.slice(6) : '';
-    const [low, high] = numbers(text, 2) ?? [];
-    if (sensor === '' || low === undefined || high === undefined || low >= high) continue;
-    ranges.set(sensor, { low, high });
-  }
-  return ranges;
-}
-
 function cameraOf(values: readonly number[] | null): Camera | null {
   const [x, y, span] = values ?? [];
   if (x === undefined || y === undefined || span === undefined || span <= 0) return null;
@@ -143,8 +117,6 @@ function numbers(text: string | null, count: number): readonly number[] | null {
   const values = (text ?? '').split(',').map((part) => (part.trim() === '' ? NaN : Number(part)));
   return values.length === count && values.every(Number.isFinite) ? values : null;
 }
-
-const short = (value: number): string => String(Number(value.toPrecision(6)));
 
 const layersText = (layers: ReadonlySet<Layer>): string =>
   LAYERS.filter((layer) => layers.has(layer)).join(',');

@@ -2,10 +2,9 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { showTags } from '../testing/page';
 import { CATALOGUE } from '../testing/sensors';
-import { readings, stateFrame, tag, wireTag } from '../testing/tags';
-import { act, receive, store } from './app';
-import { withState } from './twin';
-import { addressOfPage, cycleSetting, nextSensor, sensorsOf, startCycle } from './cycle';
+import { readings, tag, wireTag } from '../testing/tags';
+import { act, store } from './app';
+import { addressOfPage, cycleSetting, sensorsOf, startCycle } from './cycle';
 import { DEFAULT_VIEW } from './view';
 
 let stop: () => void;
@@ -31,7 +30,6 @@ const pass = (seconds: number): void => {
 
 test('shows each sensor that exists for as long as was wished', () => {
   stop = startCycle({ seconds: 30, refused: null });
-  expect(nextSensor.get()?.sensor.name).toBe('humidity');
   pass(29.9);
   expect(inView()).toBe('temperature');
   const seen = [0, 1, 2].map(() => {
@@ -41,34 +39,6 @@ test('shows each sensor that exists for as long as was wished', () => {
   expect(seen).toEqual(['humidity', 'co2', 'temperature']);
 });
 
-test('news do not put it off, a choice by hand does', () => {
-  stop = startCycle({ seconds: 30, refused: null });
-  pass(20);
-  const tags = [wireTag({ readings: readings({ temperature: 21, humidity: 61, light: 900 }) })];
-  receive(withState(stateFrame(tags, { sec: 9_999 }), performance.now()));
-  pass(10);
-  expect(inView()).toBe('humidity');
-  pass(20);
-  act({ sensor: 'temperature' });
-  pass(29);
-  expect(inView()).toBe('temperature');
-  pass(1);
-  expect(inView()).toBe('humidity');
-});
-
-test('stands still while the page looks back, and goes on with a whole turn', () => {
-  stop = startCycle({ seconds: 30, refused: null });
-  act({ moment: 500 });
-  expect(nextSensor.get()).toBeNull();
-  pass(300);
-  expect(inView()).toBe('temperature');
-  act({ moment: null });
-  pass(29);
-  expect(inView()).toBe('temperature');
-  pass(1);
-  expect(inView()).toBe('humidity');
-});
-
 test('one sensor stays, and without a wish nothing changes', () => {
   stop = startCycle({ seconds: null, refused: 'soon' });
   pass(10_000);
@@ -76,7 +46,8 @@ test('one sensor stays, and without a wish nothing changes', () => {
   stop();
   showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
   stop = startCycle({ seconds: 5, refused: null });
-  expect(nextSensor.get()).toBeNull();
+  pass(10);
+  expect(inView()).toBe('temperature');
 });
 
 describe('the wish', () => {

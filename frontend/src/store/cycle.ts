@@ -1,11 +1,8 @@
 /** If set, a wall screen changes to the next sensor every few seconds. */
-import { now } from '../clock';
 import { isMeasured, type Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
 import { act, store } from './app';
-import { createStore } from './create';
 import { selectSensors } from './derived';
-import { memoLast } from '../domain/memo';
 import { selectTags } from './moment';
 
 export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
@@ -39,52 +36,15 @@ export function addressOfPage(search: string, hash: string): string {
   return `?${rest}${hash}`;
 }
 
-/** The next sensor, and when, ms on the page's clock; null: the sensor in view stays. */
-export const nextSensor = createStore<{ readonly sensor: Sensor; readonly at: number } | null>(
-  null,
-);
-
-const round = memoLast(sensorsOf);
-
 export function startCycle({ seconds }: CycleSetting): () => void {
   if (seconds === null) return () => undefined;
-  let timer: ReturnType<typeof setTimeout> | undefined;
-  let shown: string | null = null;
-
-  const update = (): void => {
+  const timer = setInterval(() => {
     const state = store.get();
-    const { view } = state;
-    const sensors = round(selectTags(state), selectSensors(state));
-    // A past moment does not cycle.
-    const sensor = view.moment === null ? sensorAfter(sensors, view.sensor) : null;
-    const before = nextSensor.get();
-    if (sensor === null) {
-      clearTimeout(timer);
-      shown = null;
-      nextSensor.set(null);
-      return;
-    }
-    // A sensor chosen by hand stays for the full time.
-    const isSame = before !== null && shown === view.sensor;
-    const at = isSame ? before.at : now() + seconds * 1000;
-    if (isSame && before.sensor === sensor) return;
-    shown = view.sensor;
-    nextSensor.set({ sensor, at });
-    clearTimeout(timer);
-    timer = setTimeout(
-      () => {
-        const next = nextSensor.get();
-        if (next) act({ sensor: next.sensor.name });
-      },
-      Math.max(0, at - now()),
-    );
-  };
-
-  update();
-  const stop = store.subscribe(update);
+    const sensors = sensorsOf(selectTags(state), selectSensors(state));
+    const next = sensorAfter(sensors, state.view.sensor);
+    if (next) act({ sensor: next.name });
+  }, seconds * 1000);
   return () => {
-    clearTimeout(timer);
-    stop();
-    nextSensor.set(null);
+    clearInterval(timer);
   };
 }

@@ -4,7 +4,6 @@ import { fieldWith } from '../testing/field';
 import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { act, store } from './app';
-import { withRange } from './view';
 import { selectColumns, selectHealth, selectRange, selectSensors, selectZones } from './derived';
 
 beforeEach(() => {
@@ -30,11 +29,6 @@ describe('range in use', () => {
       return selectRange(store.get());
     });
     expect(new Set(seen.slice(1)).size).toBe(1);
-  });
-
-  test('a fixed one comes before all', () => {
-    act(withRange({ low: 0, high: 50 }));
-    expect(selectRange(store.get())).toEqual({ low: 0, high: 50 });
   });
 
   test('is the field’s where there is one for this sensor', () => {

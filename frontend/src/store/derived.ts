@@ -40,7 +40,7 @@ import { boundsOf } from '../geometry/coordinates';
 import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
 import { isColumnShown } from './settings';
-import { fixedRange, type Sort, type ViewState } from './view';
+import type { Sort, ViewState } from './view';
 
 const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
@@ -125,11 +125,9 @@ const rangeOfReadings = memoLast((tags: readonly Tag[], sensor: string): Range |
   rangeOf(tags.map((tag) => tag.readings.get(sensor))),
 );
 
-/** The colour range by value: the fixed one, else that of field or readings, with the ideal. */
+/** The colour range by value: that of field or readings, with the ideal. */
 export function selectRange(state: AppState): Range | null {
   const { view } = state;
-  const fixed = fixedRange(view);
-  if (fixed) return fixed;
   const { field, held } = selectShown(state);
   const isMapped = field.value?.sensor === view.sensor && field.value.sampleCount > 0;
   const readings = rangeOfReadings(selectTags(state), view.sensor);

@@ -39,6 +39,7 @@ beforeEach(() => {
     );
   });
   showTags([wireTag({ readings: readings({ temperature: 22 }) })]);
+  goLive(status({ day_length_s: 60 }));
   stop = startDifference();
 });
 afterEach(() => {
@@ -57,11 +58,13 @@ test('nothing is fetched while nothing is compared', async () => {
 });
 
 test('both fields are fetched on one box, and their difference is the heat map', async () => {
-  act({ compare: { by: 'moment', at: 500 } });
+  act({ compare: 'day' });
   // Until then nothing is shown as a difference.
   expect(selectHeat(store.get())).toBeNull();
   await settled();
-  expect(requests.map((query) => query.get('at'))).toEqual([null, '500.000']);
+  const { at = NaN, against } = store.get().twin.difference.value ?? {};
+  expect(against).toBe(at - 60);
+  expect(requests.map((query) => query.get('at'))).toEqual([null, (at - 60).toFixed(3)]);
   const boxes = requests.map((query) =>
     [...query].filter(([key]) => key.startsWith('bbox')).join(),
   );
@@ -70,12 +73,11 @@ test('both fields are fetched on one box, and their difference is the heat map',
   const heat = selectHeat(store.get());
   expect([...(heat?.field.values ?? [])]).toEqual([1.5, NaN]);
   expect(heat?.range).toEqual({ low: -1.5, high: 1.5 });
-  expect(heat?.difference?.against).toBe(500);
 });
 
 test('without data of then there is no heat map, and all of the map is marked as unknown', async () => {
   known.samplesThen = 0;
-  act({ compare: { by: 'moment', at: 500 } });
+  act({ compare: 'day' });
   await settled();
   expect(store.get().twin.difference.state).toBe('ready');
   expect(selectHeat(store.get())).toBeNull();
@@ -86,7 +88,7 @@ test('a moment without a tag has nothing to compare, instead of a difference on 
   act({ moment: 50 });
   const empty = snapshotOf(stateFrame([]), 0, null);
   receive(withPast({ at: 50, house: { ...NO_HOUSE, snapshot: empty } }));
-  act({ compare: { by: 'moment', at: 500 } });
+  act({ compare: 'day' });
   await settled();
   expect(requests).toEqual([]);
   expect(store.get().twin.difference.value).toEqual({ field: null, at: 50, against: 50 });
@@ -96,30 +98,30 @@ test('while the twin is silent, the shown state keeps its own time', async () =>
   const at = (): number | undefined => store.get().twin.difference.value?.at;
   const clock = vi.spyOn(performance, 'now');
   clock.mockReturnValue(performance.now() + 60_000);
-  act({ compare: { by: 'ago', seconds: 10 } });
+  act({ compare: 'day' });
   await settled();
   expect(at()).toBeGreaterThanOrEqual(160);
   clock.mockReturnValue(performance.now() + 5_000);
-  goLive(status({ twin: 'offline', reason: 'stale' }));
+  goLive(status({ twin: 'offline', reason: 'stale', day_length_s: 60 }));
   await vi.advanceTimersByTimeAsync(5_000);
   expect(at()).toBeLessThan(160);
   clock.mockRestore();
 });
 
-test.each([
-  ['ROS time 0', { by: 'ago', seconds: 1e12 }],
-  ['all recorded data', { by: 'moment', at: 49 }],
-] as const)('before %s nothing is fetched', async (_, compare) => {
-  const value = timelineOf(wireTimeline({ from: 0, to: 90, reach: wireStretch(50, 90) }), 90);
-  receive({ remembered: ready(value) });
-  act({ compare });
-  await settled();
-  expect(requests.map((query) => query.get('at'))).toEqual([null]);
-  expect(selectMapped(store.get())?.sampleCount).toBe(0);
-});
+test.each(['day', 'week'] as const)(
+  'before all recorded data nothing is fetched of a %s ago',
+  async (compare) => {
+    const reach = wireStretch(1_000, 2_000);
+    receive({ remembered: ready(timelineOf(wireTimeline({ from: 0, to: 2_000, reach }), 2_000)) });
+    act({ compare });
+    await settled();
+    expect(requests.map((query) => query.get('at'))).toEqual([null]);
+    expect(selectMapped(store.get())?.sampleCount).toBe(0);
+  },
+);
 
 test('no difference of one sensor is shown as that of another, nor after it ends', async () => {
-  act({ compare: { by: 'moment', at: 500 } });
+  act({ compare: 'day' });
   await settled();
   act({ sensor: 'co2' });
   expect(selectHeat(store.get())).toBeNull();
@@ -132,7 +134,7 @@ test('no difference of the past is shown live', async () => {
   const { latest } = store.get().twin;
   act({ moment: 600 });
   receive(withPast({ at: 600, house: latest }));
-  act({ compare: { by: 'ago', seconds: 100 } });
+  act({ compare: 'week' });
   await settled();
   expect(store.get().twin.difference.value?.at).toBe(600);
   goLost();
@@ -141,7 +143,7 @@ test('no difference of the past is shown live', async () => {
 });
 
 test('no difference of readings is shown as that of estimates', async () => {
-  act({ compare: { by: 'moment', at: 500 } });
+  act({ compare: 'day' });
   await settled();
   expect(store.get().twin.difference.value).not.toBeNull();
   // Of then there is no estimate: the nearest readings in its place are not compared with one of now.

@@ -3,13 +3,20 @@
  * grid.
  */
 import { now } from '../clock';
-import { differenceOf, otherMoment, type Compare } from '../domain/difference';
+import { COMPARED, differenceOf, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
 import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { isBeforeAll, isReceivingNow, rosNow, selectLatest, selectShown } from './moment';
+import {
+  isBeforeAll,
+  isReceivingNow,
+  rosNow,
+  selectDayS,
+  selectLatest,
+  selectShown,
+} from './moment';
 import { DRAG_PACE_MS, failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { type Difference } from './twin';
 
@@ -60,7 +67,7 @@ function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | und
   const { sensor } = state.view;
   const source = sourceOf(state);
   const at = moment ?? Math.floor(nowS / STEP_S) * STEP_S;
-  const against = otherMoment(compare, at);
+  const against = at - COMPARED[compare] * selectDayS(state);
   const what = [epoch, sensor, source, moment ?? snapshot.revision, against, box];
   return {
     key: JSON.stringify(what),

@@ -6,7 +6,6 @@ import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { withState } from './twin';
 import { selectHeat } from './derived';
-import { fetchHeat } from './heat';
 import { startLoaders } from './loaders';
 
 let requests: string[];
@@ -101,16 +100,6 @@ test('a house that changes ten times a second costs one estimate a second', asyn
   expect(count('estimate.npy')).toBeLessThanOrEqual(5);
 });
 
-test('that there was no estimate then does not hide the one of now', async () => {
-  const { signal } = new AbortController();
-  const query = { sensor: 'temperature', resolution: 1 };
-  refusal = 400;
-  const then = await fetchHeat('estimate', { ...query, at: 500 }, signal);
-  expect(then.noEstimate).toBe('ten scans are needed');
-  refusal = null;
-  expect((await fetchHeat('estimate', query, signal)).sureness).toBeDefined();
-});
-
 test('without an estimate, the nearest readings are shown, with the reason', async () => {
   refusal = 503;
   showTags(tags);
@@ -120,13 +109,6 @@ test('without an estimate, the nearest readings are shown, with the reason', asy
   expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { sampleCount: 4 } });
   act({ heat: 'error' });
   expect(selectHeat(store.get())?.isError).toBe(false);
-  // Retried at intervals, not with every reading.
-  const before = count('estimate.npy');
-  for (let change = 0; change < 5; change++) {
-    receiveState(2_000 + change);
-    await vi.advanceTimersByTimeAsync(1_000);
-  }
-  expect(count('estimate.npy')).toBe(before);
   refusal = null;
   await until(() => field().value?.sureness !== undefined);
 });

@@ -1,5 +1,4 @@
 /** Fetches the heat map's source: the nearest readings, or the chosen estimate. */
-import { now } from '../clock';
 import { fetchEstimate, fetchField, Refusal, type FieldQuery } from '../contract/api';
 import type { Field } from '../contract/types';
 import { estimatedField, resolutionFor } from '../domain/field';
@@ -8,17 +7,7 @@ import type { Snapshot, Tag } from '../domain/twin';
 import { boundsOf, type Bounds, widened } from '../geometry/coordinates';
 import type { Source } from './derived';
 
-/** Pause before another request, ms, after the twin has refused an estimate. */
-const CALM_MS = 10_000;
 const TOO_MANY_REQUESTS = 429;
-
-let refused: {
-  readonly sensor: string;
-  /** A refusal of the past says nothing about now. */
-  readonly isNow: boolean;
-  readonly why: string;
-  readonly until: number;
-} | null = null;
 
 /** If the twin has no estimate, the nearest readings, with the reason. */
 export async function fetchHeat(
@@ -27,24 +16,14 @@ export async function fetchHeat(
   signal: AbortSignal,
 ): Promise<Field> {
   if (source === 'nearest') return fetchField(query, signal);
-  const isNow = query.at === undefined;
-  if (refused?.sensor === query.sensor && refused.isNow === isNow && now() < refused.until) {
-    return inPlace(refused.why, query, signal);
-  }
   try {
-    const estimate = await fetchEstimate(query, signal);
-    if (refused?.isNow === isNow) refused = null;
-    return estimatedField(query.sensor, estimate);
+    return estimatedField(query.sensor, await fetchEstimate(query, signal));
   } catch (error) {
     // After 429, a second request would make it worse.
     if (!(error instanceof Refusal) || error.status === TOO_MANY_REQUESTS) throw error;
-    refused = { sensor: query.sensor, isNow, why: error.message, until: now() + CALM_MS };
-    return inPlace(error.message, query, signal);
+    return { ...(await fetchField(query, signal)), noEstimate: error.message };
   }
 }
-
-const inPlace = (noEstimate: string, query: FieldQuery, signal: AbortSignal): Promise<Field> =>
-  fetchField(query, signal).then((field) => ({ ...field, noEstimate }));
 
 /** The server's box contains the pinned tags, widened by its max_distance_m. */
 const ASSUMED_MARGIN_M = 1.5;

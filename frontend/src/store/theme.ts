@@ -4,7 +4,7 @@ const system = window.matchMedia('(prefers-color-scheme: dark)');
 const forced = window.matchMedia('(forced-colors: active)');
 let printing = false;
 
-/** On paper nothing pulses, and the pointer leaves no mark. */
+/** On paper the pointer leaves no mark. */
 export function isPrinting(): boolean {
   return printing;
 }

@@ -3,28 +3,13 @@ import { expect, test } from 'vitest';
 import { fromFragment, toFragment } from './address';
 import {
   DEFAULT_VIEW,
-  fixedRange,
   viewAfter,
   type ViewState,
   withChart,
   withList,
-  withRange,
   withSort,
   withTag,
 } from './view';
-
-test('each sensor keeps its own fixed range', () => {
-  const range = { low: 1, high: 2 };
-  const fixed = viewAfter(DEFAULT_VIEW, withRange(range));
-  const other = viewAfter(fixed, { sensor: 'co2' });
-  expect(fixedRange(other)).toBeNull();
-  const both = viewAfter(other, withRange({ low: 400, high: 900 }));
-  const back = viewAfter(both, { sensor: DEFAULT_VIEW.sensor });
-  expect(fixedRange(back)).toEqual(range);
-  const free = viewAfter(back, withRange(null));
-  expect([...free.ranges.keys()]).toEqual(['co2']);
-  expect(DEFAULT_VIEW.ranges.size).toBe(0);
-});
 
 test('the sensor that is in view already changes nothing', () => {
   const same = { sensor: DEFAULT_VIEW.sensor };

@@ -1,5 +1,4 @@
 import type { Verdict } from '../contract/types';
-import type { Range } from '../domain/ramp';
 import type { Compare } from '../domain/difference';
 import type { Period } from '../domain/time';
 import type { Camera } from '../geometry/coordinates';
@@ -61,8 +60,6 @@ export interface ViewState {
   readonly chartedFrom: ViewState['pane'] | null;
   /** Whether colours show values against their ideal range, or how high they are. */
   readonly colouring: 'ideal' | 'value';
-  /** Fixed colour scales by sensor; other scales follow the data. */
-  readonly ranges: ReadonlyMap<string, Range>;
   /** null: everything, also when the map grows. */
   readonly camera: Camera | null;
   readonly sort: Sort;
@@ -90,7 +87,6 @@ export const DEFAULT_VIEW: ViewState = {
   chart: null,
   chartedFrom: null,
   colouring: 'ideal',
-  ranges: new Map(),
   camera: null,
   // The worst first.
   sort: { column: 'health', descending: true },
@@ -106,10 +102,6 @@ export const SHORT_PERIOD: Period = { kind: 'hour' };
 /** Whether a link or a user has chosen it: a choice is always a new object. */
 export const isChosen = (period: Period): boolean =>
   period !== DEFAULT_VIEW.period && period !== SHORT_PERIOD;
-
-export function fixedRange({ ranges, sensor }: ViewState): Range | null {
-  return ranges.get(sensor) ?? null;
-}
 
 /** Rounds to milliseconds; no moment is before ROS time 0. */
 export const roundedMoment = (moment: number): number =>
@@ -137,16 +129,6 @@ export const withLayer =
   ({ layers }) => ({
     layers: new Set(LAYERS.filter((each) => (each === layer ? on : layers.has(each)))),
   });
-
-/** Fixes the colour scale of the sensor in view; null: it follows the data. */
-export const withRange =
-  (range: Range | null): With =>
-  (view) => {
-    const ranges = new Map(view.ranges);
-    if (range) ranges.set(view.sensor, range);
-    else ranges.delete(view.sensor);
-    return { ranges };
-  };
 
 export const withSort =
   (column: string): With =>

@@ -41,12 +41,6 @@ export class FakeContext {
         if (name in state) return state[name];
         return (...args: unknown[]) => {
           calls.push({ name, args, state: { ...state } });
-          if (name === 'createLinearGradient') {
-            const addColorStop = (...stop: unknown[]): void => {
-              calls.push({ name: 'addColorStop', args: stop, state: { ...state } });
-            };
-            return { addColorStop };
-          }
           return undefined;
         };
       },

@@ -55,6 +55,5 @@ export const snapshot = (tags: readonly Tag[]): Snapshot => ({
   revision: 'r1',
   at: { sec: 1000, nanosec: 0 },
   takenAt: 0,
-  fresh: [],
   isWhole: true,
 });

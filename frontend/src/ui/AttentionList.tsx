@@ -2,13 +2,12 @@ import { useRef, type CSSProperties, type JSX } from 'react';
 
 import { blocksOf, tagsText } from '../alarms/arrange';
 import { timeOfDay } from '../clock';
-import { minuteText, shortAgeText } from '../domain/format';
+import { minuteText } from '../domain/format';
 import { byCause, isBad, isSilent, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
-import { useSelected } from '../store/create';
-import { addressOfPage, CYCLE_LIMITS, nextSensor, type CycleSetting } from '../store/cycle';
-import { selectCatalogue, selectHealth, selectSensor } from '../store/derived';
+import { addressOfPage, CYCLE_LIMITS, type CycleSetting } from '../store/cycle';
+import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
@@ -137,13 +136,8 @@ function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): strin
 /** Most characters of a refused cycle setting that are quoted. */
 const LONGEST_SETTING = 12;
 
-/** In a wall screen's header: the time, the sensor and time to the next one, and how to leave. */
+/** In a wall screen's header: the time, and how to leave. */
 export function KioskNote({ cycle }: { cycle: CycleSetting }): JSX.Element {
-  const next = useSelected(nextSensor);
-  const sensor = useApp(selectSensor);
-  const left = useTicking((now) =>
-    next ? shortAgeText(Math.max(0, Math.ceil((next.at - now) / 1000))) : null,
-  );
   const time = useTicking(() => minuteText(timeOfDay()));
   return (
     <div className="kiosk-note" data-testid="kiosk-note">
@@ -154,12 +148,6 @@ export function KioskNote({ cycle }: { cycle: CycleSetting }): JSX.Element {
             CYCLE_LIMITS.least,
             CYCLE_LIMITS.most,
           )}
-        </span>
-      )}
-      {next && left !== null && (
-        <span className="kiosk-cycle" data-testid="cycle">
-          <strong>{shown(sensor.label, 24)}</strong>{' '}
-          <span>{S.cycleNext(shown(next.sensor.label, 24), left)}</span>
         </span>
       )}
       <button type="button" className="text-button" onClick={closeKiosk}>

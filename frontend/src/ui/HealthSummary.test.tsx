@@ -23,7 +23,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: [co2] }));
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
-  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical 1 tag');
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical · 1 tag');
   expect(driver().textContent).toBe('Tag 5: CO₂ 4,000\u00a0ppm, above 3,000');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
@@ -216,7 +216,7 @@ test('what is back in its range is to be watched', () => {
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, stressed until above 18.5Keep an eye on it',
+    'StressedTag 5: Temperature 18.1\u00a0°C, must rise above 18.5Keep an eye on it',
   );
 });
 

@@ -33,7 +33,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
             <HealthMark verdict={health.verdict} text={isLast ? S.healthNotCurrent : undefined} />
           )}
           {hasSnapshot && isBad(health.verdict) && count > 0 && !isSilent(health) && (
-            <span> {S.shownOf(count, count)}</span>
+            <span> · {S.shownOf(count, count)}</span>
           )}
         </h2>
         <ShelvedCount disabled={kiosk} />

@@ -6,7 +6,6 @@ import { act, prefer, store, useApp } from '../store/app';
 import { announce } from '../store/create';
 import { selectRows, selectSensors } from '../store/derived';
 import { backToLive } from '../store/moment';
-import { isDark } from '../store/theme';
 import { type ViewState, withChart, withList, withTag } from '../store/view';
 import { S } from '../strings';
 import { togglePlayback } from '../timebar/playback';
@@ -126,7 +125,7 @@ const takesSpace = (target: EventTarget | null): boolean =>
 /** Runs a key's shortcut; false: the key did nothing. */
 function runKey(key: string): boolean {
   const state = store.get();
-  const { settings, view } = state;
+  const { view } = state;
   if (/^[1-9]$/.test(key)) {
     const sensor = selectSensors(state)[Number(key) - 1];
     if (sensor) act({ sensor: sensor.name });
@@ -162,12 +161,6 @@ function runKey(key: string): boolean {
     case 'a':
       act(withList('alarms'));
       requestAnimationFrame(() => document.getElementById(ALARMS_ID)?.focus());
-      return true;
-    case 'u':
-      prefer({ unit: settings.unit === 'C' ? 'F' : 'C' });
-      return true;
-    case 't':
-      prefer({ theme: isDark() ? 'light' : 'dark' });
       return true;
     case '?':
       openHelp();

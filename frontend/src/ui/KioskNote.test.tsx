@@ -1,29 +1,16 @@
 import { render, screen } from '@testing-library/react';
-import { afterEach, expect, test } from 'vitest';
+import { expect, test } from 'vitest';
 
-import { sensorNamed } from '../testing/sensors';
-import { nextSensor } from '../store/cycle';
 import { showTags } from '../testing/page';
 import { KioskNote } from './AttentionList';
 
 const NONE = { seconds: null, refused: null };
-
-afterEach(() => {
-  nextSensor.set(null);
-});
 
 test('names the key that leads out and says the time, and nothing else without a round', () => {
   showTags([]);
   render(<KioskNote cycle={NONE} />);
   expect(screen.getByTestId('kiosk-note').textContent).toMatch(/^Exit Esc\d\d:\d\d$/);
   expect(screen.getByRole('button')).toBeInstanceOf(HTMLButtonElement);
-});
-
-test('says which sensor is shown, which comes next and when', () => {
-  showTags([]);
-  nextSensor.set({ sensor: sensorNamed('humidity'), at: performance.now() + 22_500 });
-  render(<KioskNote cycle={{ seconds: 30, refused: null }} />);
-  expect(screen.getByTestId('cycle').textContent).toBe('Temperature next: Humidity in 23\u00a0s');
 });
 
 test('an invalid cycle is reported, with its limits and cut to fit', () => {

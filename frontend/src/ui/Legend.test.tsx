@@ -3,7 +3,6 @@ import { beforeAll, beforeEach, describe, expect, test } from 'vitest';
 
 import { act, prefer, receive, store } from '../store/app';
 import { withField, withLatest, withPast } from '../store/twin';
-import { fixedRange, withRange } from '../store/view';
 import { fieldWith } from '../testing/field';
 import { judgement, NOBODY, reason } from '../testing/health';
 import { showField, showTags } from '../testing/page';
@@ -52,7 +51,7 @@ describe('legend', () => {
     rerender(<Legend kiosk={false} />);
     expect(at('rmse')).toBe('Typical error 2.7\u00a0°F');
     // It is the map's, not that of a difference.
-    act({ compare: { by: 'ago', seconds: 86_400 } });
+    act({ compare: 'day' });
     rerender(<Legend kiosk={false} />);
     expect(screen.queryByTestId('rmse')).toBeNull();
     act({ compare: null });
@@ -76,19 +75,6 @@ describe('legend', () => {
     act({ moment: 50 });
     rerender(<Legend kiosk={false} />);
     expect(screen.queryByTestId('legend-old')).toBeNull();
-  });
-
-  test.each([
-    [12, 30, '18.0\u00a0to\u00a026.0'],
-    [18, 30, 'below 26.0'],
-    [12, 26, 'above 18.0'],
-    [18, 26, ''],
-  ])('of an ideal range from %d to %d no limit is shown twice', (low, high, limits) => {
-    act(withRange({ low, high }));
-    render(<Legend kiosk={false} />);
-    expect(at('legend')).toContain(`daytime ideal${limits && ` ${limits}`}`);
-    expect(at('legend').match(/18\.0/g)).toHaveLength(1);
-    expect(at('legend').match(/26\.0/g)).toHaveLength(1);
   });
 
   test('a field of another sensor does not count', () => {
@@ -149,7 +135,7 @@ describe('legend', () => {
   });
 
   test('tells of a difference alone while there is one, and has nothing to choose its colours by', () => {
-    act({ compare: { by: 'ago', seconds: 86_400 } });
+    act({ compare: 'day' });
     render(
       <div className="layers">
         <button>Layers</button>
@@ -163,18 +149,6 @@ describe('legend', () => {
     expect(screen.getByTestId('range-low')).toBeTruthy();
     // The button is gone; its focus must not be.
     expect(document.activeElement).toBe(screen.getByRole('button', { name: 'Layers' }));
-  });
-
-  test('a fixed range stays while the data change, and can be typed', () => {
-    render(<Legend kiosk={false} />);
-    fireEvent.click(screen.getByRole('radio', { name: 'Fixed' }));
-    const low = screen.getByLabelText(/^Lowest/);
-    fireEvent.change(low, { target: { value: '15' } });
-    fireEvent.blur(low);
-    expect(fixedRange(store.get().view)).toMatchObject({ low: 15 });
-    expect(at('range-low')).toBe('15.0');
-    fireEvent.click(screen.getByRole('radio', { name: 'Auto' }));
-    expect(fixedRange(store.get().view)).toBeNull();
   });
 
   test('a wall screen has no controls', () => {

@@ -4,7 +4,7 @@ import type { FieldQuality } from '../contract/types';
 import { differenceNumber, rangeText, readingText, valueText, withUnit } from '../domain/format';
 import { IDEAL_ALPHA, idealParts, idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
-import type { Sensor, Span } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
 import {
@@ -96,14 +96,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
         <summary>{S.legendMore}</summary>
         <div className="legend-facts">
           {!kiosk && !isError && !isCompared && (
-            <div className="legend-controls">
-              {hasIdeal && <ColouringControl />}
-              {!isIdeal && (
-                <WithParts>
-                  {(parts) => <parts.RangeControl sensor={sensor} range={range} />}
-                </WithParts>
-              )}
-            </div>
+            <div className="legend-controls">{hasIdeal && <ColouringControl />}</div>
           )}
           <span data-testid="sample-count">
             {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
@@ -145,31 +138,13 @@ function Quality({
   quality: FieldQuality;
   sensor: Sensor;
 }): JSX.Element | null {
-  const { rmse, worst } = quality;
+  const { rmse } = quality;
   if (rmse === null) return null;
-  const error = (value: number): string =>
-    withUnit(sensor, differenceNumber(sensor, Math.abs(value)));
-  const atWorst = worst
-    ? ` ${S.legendErrorWorst(shown(worst.tag_id, 24), error(worst.error))}`
-    : '';
   return (
-    <span title={S.legendErrorHint + atWorst} data-testid="rmse">
-      {S.legendError(error(rmse))}
+    <span title={S.legendErrorHint} data-testid="rmse">
+      {S.legendError(withUnit(sensor, differenceNumber(sensor, Math.abs(rmse))))}
     </span>
   );
-}
-
-/** The ideal range in words; a limit already shown at an end of the ramp is not repeated. */
-function idealNote(
-  sensor: Sensor,
-  ideal: Span,
-  ends: readonly [low: string, high: string],
-): string {
-  const part = S.idealParts[sensor.part ?? 'any'];
-  const [low, high] = [valueText(sensor, ideal[0]), valueText(sensor, ideal[1])];
-  const isHigh = ends[1] === readingText(sensor, ideal[1]);
-  if (ends[0] === low) return isHigh ? part : `${part} ${S.legendBelow(high)}`;
-  return isHigh ? `${part} ${S.legendAbove(low)}` : `${part} ${S.valueRange(low, high)}`;
 }
 
 /** The heat map's colours, from the lowest to the highest value. */
@@ -199,7 +174,9 @@ function Ramp({ sensor, range }: { sensor: Sensor; range: Range | null }): JSX.E
         <span data-testid="range-low">{low}</span>
         <span className="ramp-before" />
         {sensor.ideal && (
-          <span className="ramp-note">{idealNote(sensor, sensor.ideal, [low, high])}</span>
+          <span className="ramp-note">
+            {S.idealParts[sensor.part ?? 'any']} {rangeText(sensor, sensor.ideal)}
+          </span>
         )}
         <span data-testid="range-high">{high}</span>
       </div>

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { DAY_S, differenceText, WEEK_S, type Compare } from '../domain/difference';
+import { DAY_S, differenceText, type Compare } from '../domain/difference';
 import { cellAt, valueAt } from '../domain/field';
 import { metresText, readingText, written } from '../domain/format';
 import { idealText, rangesAt } from '../domain/ideal';
@@ -11,7 +11,7 @@ import { MapView } from '../map/MapView';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHeat, selectSensor, selectZones } from '../store/derived';
-import { selectShown } from '../store/moment';
+import { selectDayS, selectShown } from '../store/moment';
 import { LAYERS, withLayer } from '../store/view';
 import { S } from '../strings';
 import { PastFrame } from '../timebar/Past';
@@ -111,7 +111,7 @@ function LayerList(): JSX.Element {
 export function Readout(): JSX.Element | null {
   const point = useSelected(pointedAt);
   const heat = useApp(selectHeat);
-  const compare = useApp((state) => state.view.compare);
+  const compare = useApp((state) => (selectDayS(state) === DAY_S ? state.view.compare : null));
   const sensor = useApp(selectSensor);
   const difference = heat?.difference;
   const value = point && heat ? valueAt(heat.field, point) : null;
@@ -145,10 +145,9 @@ export function Readout(): JSX.Element | null {
 
 /** What a difference is relative to; for a real day or week ago, the time of day is enough. */
 function sinceText(against: string, compare: Compare | null): string {
-  const seconds = compare?.by === 'ago' ? compare.seconds : null;
   const clock = against.slice(-8, -3);
-  if (seconds === DAY_S) return S.differenceSinceYesterday(clock);
-  return seconds === WEEK_S ? S.differenceSinceWeek(clock) : S.differenceSince(against);
+  if (compare === 'day') return S.differenceSinceYesterday(clock);
+  return compare === 'week' ? S.differenceSinceWeek(clock) : S.differenceSince(against);
 }
 
 const LONGEST_BAR_PX = 110;

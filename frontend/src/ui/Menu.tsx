@@ -5,7 +5,7 @@ import { fetchSession, signOut } from '../contract/people';
 import type { Session } from '../contract/types';
 import { failureText } from '../domain/format';
 import type { TemperatureUnit } from '../domain/sensors';
-import { copyLink, reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
+import { reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
 import { LANGUAGE, S } from '../strings';
@@ -58,7 +58,6 @@ export function Menu(): JSX.Element {
       />
       <LanguageChoice />
       <ul className="menu-list">
-        {entry(S.copyLink, () => void copyAndSay())}
         {entry(S.savePng, () => void saveMapOrSay())}
         {entry(S.saveCsv, saveTable)}
         {entry(S.print, () => {
@@ -82,10 +81,6 @@ export function Menu(): JSX.Element {
       </ul>
     </>
   );
-}
-
-async function copyAndSay(): Promise<void> {
-  say((await copyLink()) ? S.linkCopied : S.linkInBar);
 }
 
 async function saveMapOrSay(): Promise<void> {

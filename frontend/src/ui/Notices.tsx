@@ -15,7 +15,7 @@ interface Notice {
   readonly title: string;
   readonly hint?: string;
   /** Detail for whoever maintains the system. */
-  readonly more?: string;
+  readonly more?: string | undefined;
   /** In the middle of an otherwise empty map. */
   readonly large?: boolean;
 }
@@ -122,7 +122,7 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
     >
       <strong>{title}</strong>
       {hint && <span>{hint}</span>}
-      {more && <More label={S.more} text={more} />}
+      <More label={S.more} text={more} />
     </div>
   );
 }

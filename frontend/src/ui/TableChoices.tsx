@@ -11,7 +11,6 @@ import { Check } from '../widgets/controls';
 /** Table settings: columns, and grouping by area. */
 export function TableChoices(): JSX.Element {
   const sensors = useApp(selectColumns);
-  const chosen = useApp((state) => state.view.sensor);
   const hidden = useApp((state) => state.settings.hidden);
   const isByArea = useApp((state) => state.settings.byArea);
   const hasAreas = useApp((state) => {
@@ -33,14 +32,7 @@ export function TableChoices(): JSX.Element {
         {columns.map(([id, label]) => (
           <Check
             key={id}
-            label={
-              <>
-                {label}{' '}
-                <small className="no-room faint" data-of={id === chosen ? 'chosen' : id}>
-                  {S.columnNoRoom}
-                </small>
-              </>
-            }
+            label={label}
             isOn={isColumnShown({ hidden }, id)}
             onChange={(isOn) => {
               prefer({ hidden: withColumn(hidden, id, isOn) });

@@ -1,7 +1,7 @@
 import { useRef, type JSX } from 'react';
 
 import { fetchHistory } from '../contract/api';
-import type { PastAttempt, TagHealth, TagHistory, WireTime } from '../contract/types';
+import type { TagHealth, TagHistory } from '../contract/types';
 import {
   beyondLimitText,
   farOffText,
@@ -12,23 +12,16 @@ import {
 } from '../domain/format';
 import { isBack, isBad, rangeReason, sideOf, attemptOutcome } from '../domain/health';
 import { speciesText } from '../domain/marks';
-import { memoLast } from '../domain/memo';
 import { rangesFor } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { secondsOf, type When } from '../domain/time';
-import { whenOf, type Tag } from '../domain/twin';
+import type { When } from '../domain/time';
+import type { Tag } from '../domain/twin';
 import { theMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { withTag } from '../store/view';
 import { selectCatalogue, selectHealth } from '../store/derived';
-import {
-  selectHasSnapshot,
-  selectLatestTag,
-  selectShown,
-  selectSnapshot,
-  selectTag,
-} from '../store/moment';
+import { selectHasSnapshot, selectLatestTag, selectShown, selectTag } from '../store/moment';
 import { useFetched } from '../store/fetcher';
 import { S } from '../strings';
 import { IconButton, useFocusBack } from '../widgets/controls';
@@ -36,7 +29,6 @@ import { Age, AgeFact, Fact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
 import { selectIsCurrent } from './DoNow';
 import { HealthMark } from './HealthMark';
-import { Sparkline } from './Sparkline';
 import { CardEstimate, lazyPart } from './lazyParts';
 import { Reasons } from './Reasons';
 
@@ -53,8 +45,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const newest = useApp((state) =>
     JSON.stringify(selectLatestTag(state, tagId)?.wire.last_observed),
   );
-  const fetched = useHistory(tagId, newest);
-  const history = fetched && asOf(fetched, moment);
+  const source = useHistory(tagId, newest)?.source;
   const root = useRef<HTMLElement>(null);
 
   useFocusBack(root);
@@ -81,7 +72,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
         />
       </header>
       {tag ? (
-        <CardBody tag={tag} health={health} history={history} />
+        <CardBody tag={tag} health={health} source={source} />
       ) : (
         hasSnapshot && <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
       )}
@@ -92,11 +83,12 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
 function CardBody({
   tag,
   health,
-  history,
+  source,
 }: {
   tag: Tag;
   health: TagHealth | undefined;
-  history: TagHistory | null;
+  /** Nothing or empty: not known. */
+  source: string | null | undefined;
 }): JSX.Element {
   const { at } = tag;
   // Without the estimate on the map, only readings left out of it are worth showing.
@@ -121,7 +113,6 @@ function CardBody({
             species={tag.sureSpecies}
             health={health}
             when={tag.readAt.get(name) ?? 'never'}
-            values={history?.sensors.find((each) => each.name === name)?.values ?? []}
           />
         ))}
       </ul>
@@ -141,9 +132,9 @@ function CardBody({
         )}
         <AgeFact label={S.cardScanned} when={tag.scannedAt} />
         {tag.inspectedAt !== 'never' && <AgeFact label={S.cardInspected} when={tag.inspectedAt} />}
-        {history?.source && (
+        {source && (
           <Fact label={S.cardSource}>
-            <bdi>{sourceText(history.source)}</bdi>
+            <bdi>{sourceText(source)}</bdi>
           </Fact>
         )}
         {tag.failedAttempt && (
@@ -181,7 +172,6 @@ function CardBody({
           )}
         </Fact>
       </dl>
-      {history && <Attempts attempts={history.tries} />}
     </div>
   );
 }
@@ -198,14 +188,12 @@ function CardReading({
   species,
   health,
   when,
-  values,
 }: {
   name: string;
   value: number | null;
   species: string;
   health: TagHealth | undefined;
   when: When;
-  values: TagHistory['sensors'][number]['values'];
 }): JSX.Element {
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
@@ -226,9 +214,6 @@ function CardReading({
       <span className="card-age faint">
         <Age when={when} />
       </span>
-      <span className="card-spark">
-        <Sparkline sensor={sensor} values={values} />
-      </span>
       {ideal && (
         <span className="card-ideal" data-side={side || undefined} data-health={out?.verdict}>
           {side && `${S.side[side]}, `}
@@ -239,56 +224,10 @@ function CardReading({
   );
 }
 
-const LONGEST = 5;
-
-/** A tag's last scans and inspections, newest first, failed ones included. */
-function Attempts({ attempts }: { attempts: readonly PastAttempt[] }): JSX.Element | null {
-  const snapshot = useApp(selectSnapshot);
-  if (!snapshot || attempts.length === 0) return null;
-  return (
-    <section className="card-attempts" aria-label={S.cardAttempts}>
-      <h3>{S.cardAttempts}</h3>
-      <ol>
-        {attempts
-          .slice(-LONGEST)
-          .reverse()
-          .map((each, index) => (
-            <li key={index}>
-              <Age when={whenOf(each.stamp, snapshot)} />
-              <span>{kindOf(each.kind)}</span>
-              <span>
-                {S.attemptOutcomes[attemptOutcome(each.status)]}
-                {each.status_detail && (
-                  <span className="faint"> {shown(each.status_detail, 160)}</span>
-                )}
-              </span>
-            </li>
-          ))}
-      </ol>
-    </section>
-  );
-}
-
-const kindOf = (kind: number | null): string => {
-  const { scan, look, any } = S.cardAttemptKinds;
-  return [scan, look][kind ?? -1] ?? any;
-};
-
-/** The history up to `moment`, ROS seconds; null: all of it. */
-export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {
-  if (moment === null) return history;
-  const wasMade = ({ stamp }: { readonly stamp: WireTime }): boolean => secondsOf(stamp) <= moment;
-  return {
-    ...history,
-    tries: history.tries.filter(wasMade),
-    sensors: history.sensors.map(({ name, values }) => ({ name, values: values.filter(wasMade) })),
-  };
-});
-
 /** Least time between two fetches while a tag is scanned over and over, ms. */
 const PACE_MS = 500;
 
-/** A tag's last scans, fetched again after each observation; null until loaded. */
+/** A tag's history, fetched again after each observation; null until loaded. */
 function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
   const { value } = useFetched<TagHistory>(
     // A link may name a tag that the twin does not know.

@@ -20,7 +20,9 @@ export interface Trouble {
   readonly id: string;
   readonly title: string;
   readonly detail?: string;
-  /** Detail for whoever maintains the system. */
+  /** For whoever maintains the system: the cause, in the English of the twin or the server... */
+  readonly cause?: string;
+  /** ...and what to know about it. */
   readonly more?: string;
 }
 
@@ -33,11 +35,7 @@ function troublesOf(
   if (LANGUAGE_TROUBLE !== null) troubles.push({ id: 'language', title: LANGUAGE_TROUBLE });
   if (isLate) troubles.push({ id: 'parts', title: S.partsLate, detail: S.partsLateHint });
   if (unread) {
-    troubles.push({
-      id: 'unread',
-      title: S.unread(unread.count),
-      detail: S.unreadLast(shown(unread.why, 160)),
-    });
+    troubles.push({ id: 'unread', title: S.unread(unread.count), cause: sentence(unread.why) });
   }
   const { status } = connection;
   if (phase === 'live' && status && status.twin_count > 1) {
@@ -60,16 +58,13 @@ function troublesOf(
       detail: S.pastFaultShown(rosText(moment)),
     });
   }
-  for (const problem of status?.input_problems ?? []) {
-    const detail = sentence(problem, MAX_PROBLEM);
-    troubles.push({ id: `input ${problem}`, title: S.inputProblem, detail });
+  const problems = status?.input_problems ?? [];
+  if (problems.length > 0) {
+    const cause = problems.map((problem) => sentence(problem, MAX_PROBLEM)).join(' ');
+    troubles.push({ id: 'input', title: S.inputProblem, cause });
   }
   for (const { reason, message, count } of status?.drops ?? []) {
-    troubles.push({
-      id: `drop ${reason}`,
-      title: S.drops(count),
-      detail: S.unreadLast(shown(message, 160)),
-    });
+    troubles.push({ id: `drop ${reason}`, title: S.drops(count), cause: sentence(message) });
   }
   return troubles;
 }
@@ -87,11 +82,11 @@ function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
   const troubles: Trouble[] = [];
   const trouble = textFor(S.journal, journal.state);
   if (trouble) {
-    const detail = `${sentence(journal.detail)} ${trouble.hint}`.trim();
     troubles.push({
       id: `journal ${journal.state}`,
       title: trouble.title,
-      detail,
+      detail: trouble.hint,
+      cause: sentence(journal.detail),
       more: S.journalMore,
     });
   }
@@ -109,7 +104,8 @@ function notificationTroubles(channels: readonly Outward[]): readonly Trouble[] 
     .map(({ channel, detail }) => ({
       id: `outward ${channel}`,
       title: textFor(S.notificationChannels, channel) ?? S.notificationOther(shown(channel, 40)),
-      detail: `${sentence(detail)} ${S.notificationHint}`.trim(),
+      detail: S.notificationHint,
+      cause: sentence(detail),
     }));
 }
 
@@ -129,10 +125,10 @@ export function Troubles(): JSX.Element {
   return (
     // Rendered even when empty: screen readers announce only changes in an existing region.
     <div role="status" className="troubles" data-testid="troubles">
-      {troublesOf(twin, moment, isLate).map(({ id, title, detail, more }) => (
+      {troublesOf(twin, moment, isLate).map(({ id, title, detail, cause, more }) => (
         <div key={id}>
           <strong>{title}</strong> {detail && <span>{detail}</span>}
-          {more && <More label={S.more} text={more} />}
+          <More label={S.more} english={cause} text={more} />
         </div>
       ))}
     </div>
@@ -144,18 +140,16 @@ export function offlineReason(status: StatusFrame | null): string {
   return textFor(S.offlineWhy, status?.reason) ?? S.frozenWhy.offline;
 }
 
-/** The same for whoever maintains the system; empty: nothing to add. */
-export const offlineMore = (status: StatusFrame | null): string =>
-  status?.reason === 'clock_doubted'
-    ? sentence(status.journal.detail, MAX_PROBLEM)
-    : (textFor(S.offlineMore, status?.reason) ?? '');
+/** The same for whoever maintains the system; undefined: nothing to add. */
+export const offlineMore = (status: StatusFrame | null): string | undefined =>
+  textFor(S.offlineMore, status?.reason);
 
 /** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {
   const phase = useApp((state) => state.twin.phase);
   const takenAt = useApp((state) => selectLatest(state).snapshot?.takenAt);
   const isTimeLost = useApp((state) => state.twin.isTimeLost);
-  const connection = useApp((state) => state.twin.connection);
+  const status = useApp((state) => state.twin.connection.status);
   const isPast = useApp((state) => selectShown(state).moment !== null);
   const fault = useApp(selectClockFault);
   const isDated = fault === null;
@@ -177,9 +171,17 @@ export function FrozenBanner(): JSX.Element | null {
         )}
         <span>
           {fault && <strong>{S.clockTodo[fault]} </strong>}
-          {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
+          {phase === 'offline' ? offlineReason(status) : S.frozenWhy[phase]}
         </span>
-        {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
+        {phase === 'offline' && (
+          <More
+            label={S.more}
+            english={
+              fault === 'clock_doubted' ? sentence(status?.journal.detail ?? '', MAX_PROBLEM) : ''
+            }
+            text={offlineMore(status)}
+          />
+        )}
         {isPast && <span>{S.frozenPastStays}</span>}
       </div>
       {phase === 'reconnecting' && (

@@ -10,7 +10,7 @@ import '../styles/alarm-rows.css';
 import '../styles/row-menu.css';
 import '../styles/attention.css';
 import '../styles/comments.css';
-import '../styles/bound.css';
+import '../styles/difference.css';
 import '../styles/paper.css';
 // Last, as it overrides the others.
 import '../styles/print.css';
@@ -32,6 +32,5 @@ export { InLayers, InLegend, OnMap } from './extras';
 export { startShell } from './install';
 export { Menu } from './Menu';
 export { PaperLine } from './PaperLine';
-export { RangeControl } from './RangeControl';
 export { TableChoices } from './TableChoices';
 export { TagCard } from './TagCard';

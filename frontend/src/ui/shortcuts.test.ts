@@ -53,22 +53,18 @@ describe('keys', () => {
     expect(store.get().view.selected).toBeNull();
   });
 
-  test('f, u and t', () => {
+  test('f fits the map', () => {
     press('f');
     expect(fit).toHaveBeenCalledTimes(1);
-    press('u');
-    expect(store.get().settings.unit).toBe('F');
-    press('t');
-    expect(store.get().settings.theme).toBe('dark');
   });
 
   test('not while typing, not with Control, and not when switched off', () => {
     const input = document.body.appendChild(document.createElement('input'));
-    press('u', {}, input);
-    press('u', { ctrlKey: true });
+    press('n', {}, input);
+    press('n', { ctrlKey: true });
     prefer({ shortcuts: false });
-    press('u');
-    expect(store.get().settings.unit).toBe('C');
+    press('n');
+    expect(store.get().view.selected).toBeNull();
   });
 
   test('l leads back to now, and is nothing while now is shown', () => {

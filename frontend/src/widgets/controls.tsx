@@ -79,12 +79,21 @@ export const Check = ({ label, isOn, onChange, ...rest }: CheckProps): JSX.Eleme
   </label>
 );
 
-/** Collapsed detail for whoever maintains the system. */
-export function More({ label, text }: { label: string; text: string }): JSX.Element | null {
-  if (text === '') return null;
+/** Collapsed detail for whoever maintains the system; `english`, from the twin or the server, comes first. */
+export function More({
+  label,
+  text = '',
+  english = '',
+}: {
+  label: string;
+  text?: string | undefined;
+  english?: string | undefined;
+}): JSX.Element | null {
+  if (text === '' && english === '') return null;
   return (
     <details className="more">
       <summary>{label}</summary>
+      {english && <span lang="en">{english} </span>}
       {text}
     </details>
   );

@@ -111,18 +111,18 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'keys.time.3.1', 'themes.system', 'attemptOutcomes.ok', 'sensors'],
-    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
-    ...['keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
+    ...['cardPosition', 'saveCsvShort', 'legendMore'],
+    ...['keys.global.9.0', 'idealParts.any', 'colourings.ideal'],
   ],
   nl: [
     ...['phase.live', 'keys.time.3.1', 'menu', 'attemptOutcomes.ok', 'sensors', 'alarmCount'],
-    ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
-    ...['keys.global.11.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
+    ...['saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
+    ...['keys.global.9.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
     ...['speciesNames.gerbera', 'phase.offline'],
   ],
   es: [
-    ...['robotLayer', 'robotAt', 'attemptOutcomes.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],
-    ...['speciesNames.gerbera', 'keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
+    ...['robotLayer', 'robotAt', 'attemptOutcomes.ok', 'sensors', 'saveCsvShort'],
+    ...['speciesNames.gerbera', 'keys.global.9.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };
 
@@ -219,6 +219,7 @@ describe.each([
 
   test('shortens no name that a site has given a sensor', () => {
     for (const own of ['Leaf temperature', 'constructor']) expect(words.sensorShort(own)).toBe(own);
+    expect(ENGLISH.sensorShort('Humidity'), 'one name in chips and reasons').toBe('Humidity');
   });
 
   test('comes when it is asked for, and asks the page for nothing', async () => {

@@ -6,7 +6,6 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.access.credentials import MAX_COOKIE_BYTES
 from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS, Access
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
 from lupin_bridge.settings import Settings
@@ -130,10 +129,6 @@ def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
         assert refusal_of(refused) == (
             f"the address has {MAX_TARGET_BYTES + 1} bytes, the limit is {MAX_TARGET_BYTES}"
         )
-    for path in ("/" + "a/" * 64, "/docs/guide/" + "%2f" * 62):
-        refused = open_bridge.get(path)
-        assert refused.status_code == 414
-        assert refusal_of(refused) == "the path has 65 segments, the limit is 64"
 
 
 # Without a token, existing and missing paths look the same.
@@ -186,20 +181,11 @@ def session_of(closed: Served) -> str:
     return closed.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
 
 
-def test_a_session_is_found_among_other_cookies_up_to_the_limit(closed: Served) -> None:
+def test_a_session_is_found_among_other_cookies(closed: Served) -> None:
     session = session_of(closed)
-    cookie = f'a="\\"; {session.partition("=")[0]}=0.0; {session}; '
-    longest = cookie + "x" * (MAX_COOKIE_BYTES - len(cookie))
-    assert closed.get("/api/state", {"Cookie": longest}).status_code == 200
-    assert closed.handshake(headers={"Cookie": longest}) == 101
-    refused = closed.get("/api/state", {"Cookie": longest + "x"})
-    assert refused.status_code == 431
-    assert refusal_of(refused) == (
-        f"Cookie has {MAX_COOKIE_BYTES + 1} bytes, the limit is {MAX_COOKIE_BYTES}: "
-        "delete the cookies of this host"
-    )
-    assert closed.handshake(headers={"Cookie": longest + "x"}) == 431
-    assert closed.get("/api/state", {"Cookie": longest + "x", **BEARER}).status_code == 200
+    cookie = f'a="\\"; {session.partition("=")[0]}=0.0; {session}; ' + "x" * 7_000
+    assert closed.get("/api/state", {"Cookie": cookie}).status_code == 200
+    assert closed.handshake(headers={"Cookie": cookie}) == 101
     assert session.partition("=")[2] not in closed.process.output
 
 
@@ -211,7 +197,7 @@ def test_a_hostile_cookie_delays_no_other_client(closed: Served, inside: str) ->
     with closed.client() as client:
         before_s = cpu_s(closed.process.pid)
         for _ in range(10):
-            assert client.get("/signin", headers={"Cookie": hostile}).status_code == 200
+            assert client.get("/api/state", headers={"Cookie": hostile}).status_code == 401
         # Alone, one takes the standard library's parser a second; all of these take a tenth.
         assert cpu_s(closed.process.pid) - before_s < 5.0
 

@@ -318,11 +318,7 @@ async def test_errors_that_stay_are_logged_once_and_do_not_end_the_alarms(
         assert len(board.now.active) == 2
 
 
-async def test_writes_are_read_also_when_the_state_does_not_change(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # For a slow disk the feed reads once more by itself. Here it has to be woken.
-    monkeypatch.setattr("lupin_bridge.alarms.feed.AGAIN_S", 1_000_000.0)
+async def test_writes_are_read_also_when_the_state_does_not_change() -> None:
     async with following() as (feed, board, source):
         source.writes_now, source.written = [pest(1, 2)], 1
         feed.on_state(reported(1))

@@ -5,15 +5,11 @@ import shutil
 import socket
 import sqlite3
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 
 import psycopg
 import pytest
 
-from lupin_bridge.archive import forwarding
-from lupin_bridge.archive.forwarding import Forwarding
-from lupin_bridge.settings import Settings
 from lupin_twin.core.notes import COMMENT, Note, NotesRequest
 from lupin_twin.core.state import Write
 from lupin_twin.journal.paths import mark_of
@@ -31,7 +27,7 @@ from tests.support.archive import (
     wait_until_equal,
 )
 from tests.support.journal import NOW, SECOND, append, inspection, opened, pin, recording, scan
-from tests.support.waiting import until, wait_for
+from tests.support.waiting import wait_for
 
 HOUR = 3600 * SECOND
 DAY = 24 * HOUR
@@ -208,7 +204,7 @@ def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
 
 def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: Path) -> None:
     forward(archive, journal, scans(0, 50))
-    vacuum(journal, "test", lambda what, share: None)
+    vacuum(journal, "test")
     forward(archive, journal, scans(50, 5))
     assert archive.rows() == rows_of(journal)
 
@@ -260,28 +256,6 @@ def test_notes_are_forwarded_as_they_were_written(archive: Archive, journal: Pat
         found = notes(SiteLog(there, "gh1"), NotesRequest())
         assert found.notes == notes(here, NotesRequest()).notes
         assert notes(SiteLog(there, "gh2"), NotesRequest()).notes == ()
-
-
-@pytest.mark.parametrize("begin", ["echo nonsense; echo '{}'", "head -c 100000 /dev/zero"])
-async def test_a_forwarder_that_writes_nonsense_stops_no_note(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begin: str
-) -> None:
-    note, written = Note("", NOW, "anna", COMMENT, "site", "dry"), list[Note]()
-    script = tmp_path / "forwarder"
-    words = f"[ -e {tmp_path}/begun ] || {{ touch {tmp_path}/begun; {begin}; }}"
-    script.write_text(f"#!/bin/sh\n{words}\necho '{json.dumps(asdict(note))}'\nexec cat\n")
-    script.chmod(0o755)
-    monkeypatch.setattr("sys.executable", str(script))
-    monkeypatch.setattr(forwarding, "RESTART_S", 0.01)
-
-    async def put(it: Note) -> None:
-        written.append(it)
-
-    settings = Settings(site="gh1", archive_url="postgresql://nowhere.example/x")
-    forwards = Forwarding(settings, lambda: "journal", put)
-    await until(lambda: written, "the note")
-    await forwards.stop()
-    assert written == [note]
 
 
 def test_a_second_forwarder_of_a_site_is_refused_by_name(archive: Archive, journal: Path) -> None:

@@ -6,16 +6,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from builtin_interfaces.msg import Time
 from mcap.writer import CompressionType
 from rosgraph_msgs.msg import Clock
 
 from lupin_bridge.bags.recording import Recording, RecordingError
-from tests.support.messages import discovered, occupancy_grid, pose, scan
+from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import Process, children_of, is_running, lupin_twin, twin_node, url_of
-from tests.support.recordings import OBSERVATIONS, TAGS, Sent, write_bag
+from tests.support.recordings import OBSERVATIONS, Sent, write_bag
 from tests.support.web import Listener, listener, tag_ids
 
 
@@ -23,37 +22,34 @@ def sent(*at_s: float) -> list[Sent]:
     return [Sent(OBSERVATIONS, at, scan(f"tag {at}")) for at in at_s]
 
 
-def times(*paths: Path) -> list[int]:
-    with Recording(paths) as recording:
+def times(path: Path) -> list[int]:
+    with Recording(path) as recording:
         return [it.log_ns // 10**9 for it in recording.messages([OBSERVATIONS])]
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))
-def test_files_and_folders_are_played_as_one_recording_in_the_order_of_time(
+def test_a_folder_is_played_as_one_recording_in_the_order_of_time(
     tmp_path: Path, compression: CompressionType
 ) -> None:
-    """Overlapping ones too, with every compression that a recorder supports."""
-    folder = tmp_path / "part"
-    folder.mkdir()
-    write_bag(folder / "b.mcap", sent(2, 5, 6), compression=compression)
-    write_bag(folder / "a.mcap", sent(9, 1, 8), compression=compression)
-    other = write_bag(tmp_path / "c.mcap", sent(4, 7, 3), compression=compression)
-    assert times(folder, other) == [1, 2, 3, 4, 5, 6, 7, 8, 9]
-    with Recording([folder, other]) as recording:
+    """Overlapping files too, with every compression that a recorder supports."""
+    write_bag(tmp_path / "b.mcap", sent(2, 5, 6), compression=compression)
+    write_bag(tmp_path / "a.mcap", sent(9, 1, 8), compression=compression)
+    write_bag(tmp_path / "c.mcap", sent(4, 7, 3), compression=compression)
+    assert times(tmp_path) == [1, 2, 3, 4, 5, 6, 7, 8, 9]
+    with Recording(tmp_path) as recording:
         assert (recording.start_ns, recording.end_ns) == (10**9, 9 * 10**9)
-        part = recording.messages([OBSERVATIONS], from_ns=3 * 10**9, before_ns=5 * 10**9)
-        assert [it.log_ns // 10**9 for it in part] == [3, 4]
 
 
 def test_a_file_without_chunks_or_messages_is_read_and_of_several_grids_only_maps(
     tmp_path: Path,
 ) -> None:
-    plain = write_bag(tmp_path / "plain.mcap", sent(1, 2), is_chunked=False)
-    assert times(plain, write_bag(tmp_path / "empty.mcap", [])) == [1, 2]
+    write_bag(tmp_path / "plain.mcap", sent(1, 2), is_chunked=False)
+    write_bag(tmp_path / "empty.mcap", [])
+    assert times(tmp_path) == [1, 2]
     grid = occupancy_grid([[0]])
     names = ["/costmap", "/gh1/map", "/local_costmap"]
     path = write_bag(tmp_path / "a.mcap", [*sent(1), *(Sent(name, 1, grid) for name in names)])
-    with Recording([path]) as recording:
+    with Recording(path) as recording:
         assert recording.inputs.keys() == {OBSERVATIONS, "/gh1/map"}
 
 
@@ -77,7 +73,7 @@ def test_an_unreadable_file_is_named_with_the_command_that_repairs_it(
 ) -> None:
     path = make(tmp_path / "bad.mcap")
     with pytest.raises(RecordingError, match=rf"cannot read {path}: .*mcap recover {path}"):
-        Recording([path])
+        Recording(path)
 
 
 def test_a_flipped_byte_is_reported_where_it_is(tmp_path: Path) -> None:
@@ -86,7 +82,7 @@ def test_a_flipped_byte_is_reported_where_it_is(tmp_path: Path) -> None:
     at = data.index(b"tag 150")
     data[at] ^= 1
     path.write_bytes(data)
-    with Recording([path]) as recording:
+    with Recording(path) as recording:
         messages = recording.messages([OBSERVATIONS])
         next(messages)
         with pytest.raises(RecordingError, match="cannot read"):
@@ -94,36 +90,18 @@ def test_a_flipped_byte_is_reported_where_it_is(tmp_path: Path) -> None:
 
 
 def test_what_is_no_recording_or_of_no_use_is_refused(tmp_path: Path) -> None:
-    one = write_bag(tmp_path / "b.mcap", sent(1))
-    json = write_bag(tmp_path / "a.mcap", sent(1), encoding="json")
-    tags = write_bag(tmp_path / "c.mcap", [Sent(OBSERVATIONS, 1, discovered({"a": pose(1, 2)}))])
     empty = write_bag(tmp_path / "d.mcap", [])
     mapped = write_bag(tmp_path / "e.mcap", [Sent("/map", 1, occupancy_grid([[0]]))])
-    folder, fifo = tmp_path / "folder", tmp_path / "fifo"
+    folder = tmp_path / "folder"
     folder.mkdir()
-    os.mkfifo(fifo)
-    for paths, why in (
-        ([json], "encoded as 'json', must be 'cdr'"),
-        ([one, tags], "they are not parts of one recording"),
-        ([tmp_path / "none.mcap"], "No such file"),
-        ([folder], "is a folder without a .mcap file"),
-        ([fifo], "is not a file"),
-        ([empty], "has no messages"),
-        ([mapped], "has nothing that a twin subscribes to"),
+    for path, why in (
+        (tmp_path / "none.mcap", "No such file"),
+        (folder, "is a folder without a .mcap file"),
+        (empty, "has no messages"),
+        (mapped, "has nothing that a twin subscribes to"),
     ):
-        with pytest.raises(RecordingError, match=why), Recording(paths) as recording:
+        with pytest.raises(RecordingError, match=why), Recording(path) as recording:
             _ = recording.inputs
-
-
-def test_a_start_after_the_end_is_refused(tmp_path: Path) -> None:
-    path = write_bag(tmp_path / "a.mcap", [*sent(10, 12), Sent(TAGS, 11, discovered({}))])
-    with Recording([path]) as recording:
-        recording.check_start(2.0)
-        with pytest.raises(RecordingError, match=r"--start is 2.5 s, and .* has 2.0 s"):
-            recording.check_start(2.5)
-
-
-DAY_S = 86_400.0
 
 
 def seen(tag_id: str, at_s: float, topic: str = OBSERVATIONS) -> Sent:
@@ -135,11 +113,11 @@ def time_of(frame: Any) -> int:
 
 
 @contextmanager
-def demo_of(domain: int, *words: object) -> Iterator[tuple[Process, Listener]]:
-    """A demo of recordings. It deletes its journal and its player at the end."""
-    folder = Path(str(words[0])).parent
+def demo_of(domain: int, path: Path, *words: str) -> Iterator[tuple[Process, Listener]]:
+    """A demo of a recording. It deletes its journal and its player at the end."""
+    folder = path.parent
     with (
-        lupin_twin(domain, "demo", "--from", *map(str, words), TMPDIR=str(folder)) as demo,
+        lupin_twin(domain, "demo", "--from", str(path), *words, TMPDIR=str(folder)) as demo,
         listener(url_of(demo)) as screen,
     ):
         yield demo, screen
@@ -148,33 +126,6 @@ def demo_of(domain: int, *words: object) -> Iterator[tuple[Process, Listener]]:
         assert "Traceback" not in demo.output
         assert list(folder.glob("lupin-twin-*")) == []
         assert not any(map(is_running, players))
-
-
-def test_silences_are_reported_and_skipped_on_request(domain: int, tmp_path: Path) -> None:
-    sent = [seen("before", 5_000.0), seen("after", 5_000.0 + DAY_S)]
-    path = write_bag(tmp_path / "run.mcap", sent)
-    with demo_of(domain, path) as (demo, screen):
-        screen.until("state", lambda frame: tag_ids(frame["state"]) == ["before"])
-        demo.wait_for_output("the recording is silent for 86,400 s: --skip-gaps SECONDS")
-    with demo_of(domain, path, "--skip-gaps", "60") as (_, screen):
-        last = screen.until("state", lambda frame: len(tag_ids(frame["state"])) == 2)
-        assert time_of(last) >= 5_000 + DAY_S
-
-
-def test_with_a_start_time_earlier_positions_and_the_last_map_are_known(
-    domain: int, tmp_path: Path
-) -> None:
-    """More observations than the 50 that a publisher stores."""
-    names = {f"early {number}" for number in range(70)}
-    sent = [seen(name, 5_000.0 + number) for number, name in enumerate(sorted(names))]
-    sent += [Sent("/map", 5_000.0 + it, occupancy_grid([[0] * (it + 1)])) for it in range(3)]
-    sent.append(seen("still to come", 5_500.0))
-    path = write_bag(tmp_path / "run.mcap", sent)
-    with demo_of(domain, path, "--start", "100", "--speed", "0.1") as (demo, screen):
-        shown = screen.until("state", lambda frame: names <= set(tag_ids(frame["state"])))
-        assert "still to come" not in tag_ids(shown["state"])
-        assert 5_100 <= time_of(shown) < 5_200
-        assert httpx.get(f"{url_of(demo)}/api/map").json()["info"]["width"] == 3
 
 
 def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
@@ -194,15 +145,20 @@ def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
         assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
 
 
-def test_a_loop_starts_again_without_later_data(domain: int, tmp_path: Path) -> None:
-    """With files in any order, and a topic that is renamed."""
-    later = write_bag(tmp_path / "run_1.mcap", [seen("b", 5_020.0, "/gh1/seen")])
-    first = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0, "/gh1/seen")])
-    with demo_of(domain, later, first, "--loop", "--speed", "5") as (_, screen):
+def test_everything_in_a_folder_arrives_and_the_page_stays_at_its_end(
+    domain: int, tmp_path: Path
+) -> None:
+    """More observations at once than the 50 that a publisher stores, on a renamed topic."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    write_bag(folder / "run_1.mcap", [seen("last", 5_010.0, "/gh1/seen")])
+    first = [seen(str(number), 5_000.0, "/gh1/seen") for number in range(70)]
+    write_bag(folder / "run_0.mcap", first)
+    with demo_of(domain, folder, "--speed", "5") as (demo, screen):
         screen.until(
-            "state", lambda frame: time_of(frame) == 5_020 and len(tag_ids(frame["state"])) == 2
+            "state", lambda frame: time_of(frame) == 5_010 and len(tag_ids(frame["state"])) == 71
         )
-        assert screen.until("state", lambda frame: time_of(frame) < 5_010)
+        demo.wait_for_output("the end: 71 messages were published")
 
 
 def test_a_second_twin_stops_the_player_because_its_journal_would_store_the_recording(

@@ -9,6 +9,7 @@ from importlib.resources import files
 from itertools import product
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import Any
 
 import httpx
 import pytest
@@ -157,7 +158,6 @@ def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -
 def test_info_lists_the_content(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "x")  # not needed for a file that is named
     append(path, [scan("9", 7 * SECOND)], SIMULATED)
-    path.with_name("j.sqlite.damaged-20261121T141500Z").write_bytes(b"x" * 2_000_000)
     done = journal("info", "--journal", path)
     assert (done.returncode, done.stderr) == (0, "")
     found = reported("--journal", path)
@@ -166,7 +166,6 @@ def test_info_lists_the_content(path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert (found["inspections"], found["places"], found["tags"]) == ("1", "1", "3")
     assert found["sensors"] == "a, temperature"
     assert found["reach"] == "2025-11-21T04:40:00Z to 2025-11-21T05:13:19Z"
-    assert found["quarantined"] == "j.sqlite.damaged-20261121T141500Z, 2.0 MB"
     assert "2: simulated clock, begun 2025-11-21T04:40:00Z: second 7.000 to 7.000\n" in done.stdout
 
 
@@ -199,7 +198,7 @@ def test_the_wal_of_a_killed_twin_is_read_too(path: Path) -> None:
 def test_check_reports_the_damage_and_exits_with_1(path: Path) -> None:
     whole = journal("check", "--journal", path)
     assert (whole.returncode, whole.stdout) == (0, f"{path} is whole\n")
-    assert whole.stderr == "structure\nscan\nlook\nplace\n"
+    assert whole.stderr == ""
     with closing(open_writer(path)) as connection:
         connection.execute("UPDATE scan SET readings = '[' WHERE seq % 200 = 0")
     done = journal("check", "--journal", path)
@@ -230,11 +229,8 @@ def test_export_writes_the_same_rows_as_the_route(path: Path) -> None:
     assert len(every) == 2002
     assert "2025-11-21T04:40:00.000000000Z,1763700000.000000000,8,,,,,,2,robot" in every
     assert "2025-11-21T04:40:03.000000000Z,1763700003.000000000,7,1.5,2.5,a,,1.0,0,robot" in every
-    two = exported("--from", "1763700003", "--to", "2025-11-21T05:40:05+01:00", "--tag", "7")
+    two = exported("--from", "1763700003", "--to", "2025-11-21T05:40:05+01:00")
     assert [line.split(",")[7] for line in two[1:]] == ["1.0", "1.3333333333333333"]
-    nothing = journal("export", "--journal", path, "--sensor", "none")
-    assert (nothing.returncode, nothing.stdout.splitlines()) == (0, every[:1])
-    assert "nothing matches; the journal has the tags 7, 8 and the sensors a" in nothing.stderr
 
 
 def test_export_uses_the_units_of_the_operators_file(
@@ -244,11 +240,8 @@ def test_export_uses_the_units_of_the_operators_file(
     own = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
     sensors.write_text(own.replace('"temperature": {', '"a": {'), encoding="utf-8")
 
-    def unit(*words: str) -> str:
-        done = journal("export", "--journal", path, "--sensor", "a", *words)
-        return done.stdout.splitlines()[1].split(",")[6]
-
-    assert (unit(), unit("--sensors", str(sensors))) == ("", "°C")
+    monkeypatch.setenv("LUPIN_SENSORS", str(sensors))
+    assert "7,1.5,2.5,a,°C,1.0" in journal("export", "--journal", path).stdout
     monkeypatch.setenv("LUPIN_SENSORS", str(tmp_path / "none"))
     done = journal("export", "--journal", path)
     assert (done.returncode, "LUPIN_SENSORS" in done.stderr) == (1, True)
@@ -267,8 +260,6 @@ def test_vacuum_prints_the_size_before_and_after(path: Path) -> None:
     ("words", "code", "out", "err"),
     [
         ("export >/dev/full", 1, "", "lupin-twin: cannot write to the standard output: No space"),
-        # As after >/dev/null: closed output means that no output is wanted.
-        ("export >&-", 0, "", ""),
         ("export | true", 1, "", ""),  # its reader closes it
         ("check 2>/dev/full", 0, "is whole", ""),
     ],
@@ -344,13 +335,17 @@ def test_writes_during_the_backup_do_not_get_in_and_do_not_restart_it(tmp_path: 
         writer.execute("PRAGMA journal_mode = WAL")
         writer.execute("CREATE TABLE large AS SELECT zeroblob(20000000) AS bytes")
 
-        def report(share: float) -> None:
-            shares.append(share)
+        class Reader(sqlite3.Connection):
+            def backup(self, target: sqlite3.Connection, **options: Any) -> None:
+                super().backup(target, progress=write, **options)
+
+        def write(_: int, left: int, total: int) -> None:
+            shares.append(1 - left / total)
             assert len(shares) < 100, "begun anew, again and again"
             writer.execute(f"CREATE TABLE meanwhile_{len(shares)} (number)")
 
-        with closing(sqlite3.connect(source, isolation_level=None)) as reader:
-            assert backup(reader, copy, report) == copy.stat().st_size > 20_000_000
+        with closing(sqlite3.connect(source, isolation_level=None, factory=Reader)) as reader:
+            assert backup(reader, copy) == copy.stat().st_size > 20_000_000
     assert len(shares) > 2
     assert shares == sorted(set(shares))
     with closing(sqlite3.connect(copy)) as found:
@@ -384,5 +379,5 @@ def test_a_failed_backup_leaves_no_file(tmp_path: Path, capsys: pytest.CaptureFi
     # Enough for SQLite's 32 kB beside the journal, not for the copy.
     with no_file_above(40_960):
         assert main(["journal", "backup", str(copy), "--journal", str(source)]) == 1
-    assert f"\nlupin-twin: cannot copy to {copy}: " in capsys.readouterr().err
+    assert f"lupin-twin: cannot copy to {copy}: " in capsys.readouterr().err
     assert list(tmp_path.glob("copy*")) == []

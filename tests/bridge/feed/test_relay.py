@@ -349,8 +349,6 @@ async def test_a_twins_topics_are_relayed_byte_for_byte(
             "/twin/times": "lupin_msgs/msg/TwinTimes",
         }
         await only_the_expected_type_counts(relay, discovered, domain)
-        now = await relay.time()
-        assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
         for topic, text in (
             (Topic("sensor_smsgs/msg/A", "", "/a"), "is not installed here"),
             (Topic("lupin_msgs/msg/TwinState", "", "/a b"), "topic name"),

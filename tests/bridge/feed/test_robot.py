@@ -101,9 +101,9 @@ def test_a_plan_is_done_at_its_end_and_an_empty_or_old_one_is_ignored() -> None:
     assert plans == [there, there, None, again, None]
     log = RobotLog()
     round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
-    log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
-    assert log.now.plan == round_trip
-    drive(log, position(5.0, 110.0))
-    assert log.now.plan == round_trip
-    drive(log, position(0.3, 120.0))
-    assert log.now.plan is None
+    log.take(Robot(plan=round_trip), 99 * S)
+    plans = []
+    for x, at_s in ((0.0, 100.0), (5.0, 110.0), (0.3, 120.0)):
+        drive(log, position(x, at_s))
+        plans.append(log.now.plan)
+    assert plans == [None, round_trip, None]

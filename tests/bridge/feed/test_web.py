@@ -108,9 +108,10 @@ async def test_after_a_silence_a_new_node_recovers_everything(
 
             async def is_joined() -> bool:
                 try:
-                    return bool(await twin.relay.time())
+                    await twin.relay.published(lambda *_: False)
                 except TwinUnavailableError:
                     return False
+                return True
 
             async def goes_both_ways(value: float) -> None:
                 pose = PoseStamped(pose=Pose(position=Point(x=value)))

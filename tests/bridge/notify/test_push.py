@@ -38,7 +38,6 @@ from tests.support.access import refused_start
 from tests.support.messages import inspection
 from tests.support.people import (
     OWN,
-    PASSWORD,
     TOKEN,
     add,
     changing,
@@ -408,18 +407,6 @@ def test_notified_browsers_per_person_are_limited_and_the_audit_trail_has_each_o
     assert len(open_to.devices()) == 10
     assert added() == before + 12
     assert "anna has written more than" in answers[-1].text, "or they would fill the trail"
-
-
-def test_signing_out_everywhere_else_stops_notifications_there(open_to: Live) -> None:
-    add(open_to.accounts, carl="viewer")
-    with signed_in(open_to.live.url, "carl") as lost, signed_in(open_to.live.url, "carl") as stored:
-        phone = open_to.phone("lost")
-        subscribe(lost, phone)
-        given = {"name": "carl", "password": PASSWORD, "ends_others": True}
-        assert stored.post("/api/signin", json=given).status_code == 204
-        assert stored.get("/api/session").json()["name"] == "carl"
-        assert lost.get("/api/session").status_code == 401
-    assert phone.endpoint not in {device.endpoint for device in open_to.devices()}
 
 
 def test_a_contact_is_an_address() -> None:

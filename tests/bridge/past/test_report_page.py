@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import replace
-from datetime import UTC, tzinfo
+from datetime import tzinfo
 from html import unescape
 from typing import Any
 from zoneinfo import ZoneInfo
@@ -17,7 +16,6 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.report_page import ReportPage
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
-from lupin_twin.core.state import Flower, Reading, TagState
 from lupin_twin.field.idw import never
 
 # 27 November 2026, 05:00 UTC.
@@ -59,7 +57,7 @@ def body(hours: int) -> dict[str, Any]:
         "alarms_from": at(0),
         "alarms": [],
         "notes": [note],
-        "silences": [{"tag_id": "", "from": at(300), "to": at(300 + 78 * 60)}],
+        "silences": [{"from": at(300), "to": at(300 + 78 * 60)}],
         "sensors": [sensor],
         "never_scanned": [],
         "left_out": dict.fromkeys(lists, 0),
@@ -74,21 +72,15 @@ def alarm(**message: Any) -> dict[str, Any]:
     return {"id": "9", "tag_id": "7", "reason": reason, "worst": 3.0, **when, **message}
 
 
-def page_of(
-    lang: str = "en",
-    hours: int = 8,
-    zone: tzinfo | None = None,
-    tags: Sequence[TagState] = (),
-    **fields: object,
-) -> str:
+def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None, **fields: object) -> str:
     """The report's text, with spaces between its elements."""
     end_s = BEGUN_S + hours * HOUR_S
     page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN_JOURNAL, lang, zone)
-    return text_of(page, hours, tags, **fields)
+    return text_of(page, hours, **fields)
 
 
-def text_of(page: ReportPage, hours: int, tags: Sequence[TagState] = (), **fields: object) -> str:
-    text = page.plan(body(hours) | fields, tags).write(never).body.decode()
+def text_of(page: ReportPage, hours: int, **fields: object) -> str:
+    text = page.plan(body(hours) | fields).write(never).body.decode()
     return re.sub(r"[ \n\u00a0]+", " ", unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", text)))
 
 
@@ -119,29 +111,23 @@ def test_dates_and_numbers_are_written_as_on_the_page(lang: str, texts: list[str
     assert [text for text in texts if text not in page] == []
 
 
-def test_times_are_those_of_the_greenhouse_or_of_a_zone_that_this_machine_knows() -> None:
+def test_times_are_those_of_the_greenhouse_or_of_a_given_zone() -> None:
     assert "Times: Europe/Amsterdam (UTC+01:00)" in page_of()
     # From the second day on, rows have their dates.
     page = page_of(hours=20, zone=ZoneInfo("Asia/Kathmandu"))
     assert "27 Nov 2026, 10:45 to 28 Nov 2026, 06:45. Times: Asia/Kathmandu (UTC+05:45)" in page
-    assert "Greenhouse 10:50 12:08 1 h 18 min" in page
+    assert " 10:50 12:08 1 h 18 min" in page
     page = page_of(
         hours=20, alarms=[alarm(raised_at=at(19 * HOUR_S)), alarm(raised_at=at(-8 * HOUR_S))]
     )
     assert "7 28 Nov, 01:00" in page
     assert "7 26 Nov, 22:00" in page
-    period_ns = BEGUN_S * 10**9, (BEGUN_S + HOUR_S) * 10**9
-    unknown = ReportPage(*period_ns, GREENHOUSE, UNKNOWN_JOURNAL, "en", UTC, "Mars/<North>")
-    reported = (
-        "Times: UTC (UTC+00:00) This server does not know the time zone Mars/<North>: times are in"
-    )
-    assert reported in text_of(unknown, 1)
 
 
 def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_content() -> None:
     page = page_of()
     assert "06:01 Anna Comment: Boiler 2 tripped (withdrawn by Ben) Greenhouse" in page
-    assert "Gaps without scans Where From To Duration" in page
+    assert "Gaps without scans From To Duration" in page
     assert "Tags not scanned None." in page
 
 
@@ -170,7 +156,7 @@ def test_an_alarm_row_names_its_tag_or_the_greenhouse_and_who_acknowledged_it() 
     assert page.count("acknowledged by Anna, 06:02") == 1
 
 
-def test_open_alarms_come_first_with_value_and_both_limits() -> None:
+def test_open_alarms_come_first_with_the_worst_value_and_its_status() -> None:
     cold = {
         "verdict": "critical",
         "kind": "range",
@@ -179,69 +165,38 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
         "limit": 10.0,
     }
     dry = {"verdict": "stressed", "kind": "range", "sensor": "vpd", "value": 1.5, "limit": 1.3}
-    orchid = {**cold, "value": 12.0, "limit": 13.0}
-    warm = {**cold, "verdict": "stressed", "limit": 26.0}
-    read = at(600)["sec"] * 10**9
-    tags = [
-        TagState(
-            "7", readings=(Reading("temperature", 9.5, read), Reading("humidity", 30.0, read))
-        ),
-        TagState("8", readings=(Reading("temperature", 12.5, read),), flower=Flower("Orchid", 0.9)),
-        TagState("9", readings=(Reading("temperature", 9.97, read),)),
-        TagState("6", readings=(Reading("temperature", 9.1),)),
-    ]
-    alarms = [
-        alarm(tag_id="7", reason=cold, worst=8.0),
-        alarm(tag_id="8", reason=orchid, worst=11.0),
-        # At night, before its species was known, and by the twin's estimate.
-        alarm(tag_id="9", reason={**cold, "value": 31.0, "limit": 30.0}, worst=31.0),
-        alarm(tag_id="8", reason={**warm, "value": 27.0}, worst=27.0),
-        # Critical since then, with the limit at its start.
-        alarm(tag_id="8", reason={**warm, "verdict": "critical", "value": 36.0}, worst=36.0),
-        alarm(tag_id="7", reason=dry, worst=1.5),
-        alarm(tag_id="9", reason=cold, worst=8.0),
-        alarm(tag_id="6", reason=cold, worst=8.0),
-        alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
-        alarm(tag_id="7", reason={**cold, "limit": 3.5}, worst=2.0, cleared_at=at(97)),
-    ]
-    page = page_of(alarms=alarms, tags=tags)
-    active, _, resolved = page.partition("Alarms still active ")[2].partition(" Alarms resolved ")
-    assert active.startswith("Alarm Tag Raised At the end Worst value Limits ")
-    assert "7 06:01 9.5 °C (06:10) 8.0 °C (critical) 10.0 to 35.0 °C" in active
-    assert "8 06:01 12.5 °C (06:10) 11.0 °C (critical) 13.0 to 35.0 °C" in active
-    assert "9 06:01 10.0 °C (06:10) 31.0 °C (critical) 8.0 to 30.0 °C" in active
-    assert "8 06:01 12.5 °C (06:10) 27.0 °C (stressed) 18.0 to 26.0 °C" in active
-    assert "8 06:01 12.5 °C (06:10) 36.0 °C (critical) 10.0 to 35.0 °C" in active
-    assert "7 06:01 0.83 kPa (06:10) 1.50 kPa (stressed) 0.20 to 1.30 kPa" in active
-    assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C (critical) 10.0 to 35.0 °C" in active
-    assert "6 06:01 9.1 °C 8.0 °C (critical) 10.0 to 35.0 °C" in active, "its time is not known"
-    assert "7 06:01 07:19 1 h 18 min 1.60 kPa (stressed) 0.20 to 1.30 kPa" in resolved
-    # The file of sensors has another range by now.
-    assert "7 06:01 06:01 37 s 2.0 °C (critical) 3.5 °C" in resolved
-    page = page_of(
-        alarms=[alarm()], tags=[replace(tags[0], flower=Flower(bug_count=2), looked_at_ns=read)]
-    )
-    assert "7 06:01 2 (06:10) 3" in page
     failed = {**alarm()["reason"], "verdict": "unknown", "kind": "scan_failed", "value": None}
-    assert "7 06:01 unknown " in page_of(alarms=[alarm(reason=failed, worst=None)])
+    alarms = [
+        alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
+        alarm(tag_id="7", reason=cold, worst=8.0),
+        alarm(tag_id="8", reason=failed, worst=None),
+        alarm(tag_id="9"),
+    ]
+    page = page_of(alarms=alarms)
+    active, _, resolved = page.partition("Alarms still active ")[2].partition(" Alarms resolved ")
+    assert active.startswith("Alarm Tag Raised Worst value ")
+    assert "7 06:01 8.0 °C (critical)" in active
+    assert "8 06:01 unknown" in active
+    assert "9 06:01 3 (critical)" in active
+    assert "7 06:01 07:19 1 h 18 min 1.60 kPa (stressed)" in resolved
 
 
 @pytest.mark.parametrize(
-    ("lang", "numbers", "limits"),
+    ("lang", "numbers"),
     [
-        ("en", "just below 350 ppm", "350 to 1,500 ppm"),
-        ("de", "knapp unter 350 ppm", "350 bis 1.500 ppm"),
-        ("nl", "net onder 350 ppm", "350 tot 1.500 ppm"),
-        ("es", "justo por debajo de 350 ppm", "350 a 1500 ppm"),
+        ("en", "just below 350 ppm"),
+        ("de", "knapp unter 350 ppm"),
+        ("nl", "net onder 350 ppm"),
+        ("es", "justo por debajo de 350 ppm"),
     ],
 )
 def test_values_of_a_sensor_have_equal_digits_and_none_looks_like_its_limit(
-    lang: str, numbers: str, limits: str
+    lang: str, numbers: str
 ) -> None:
     low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
     assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
     page = page_of(lang, alarms=[alarm(reason=low, worst=350.0)])
-    assert re.search(rf"06:01 350 ppm \(\w+\) {limits}", page)
+    assert "06:01 350 ppm (" in page
     hot = {**low, "sensor": "temperature", "value": 40.0, "limit": 35.0}
     assert re.search(r" 1[.,]?235 °C", page_of(lang, alarms=[alarm(reason=hot, worst=1234.6)]))
 
@@ -262,27 +217,10 @@ def test_a_value_is_rounded_as_on_the_page(sensor: str, texts: dict[float, str])
     assert {value: GREENHOUSE.sensors.text_of(sensor, value) for value in texts} == texts
 
 
-def test_a_failed_reading_is_no_value_and_a_length_has_no_zero() -> None:
-    hot = {"verdict": "critical", "kind": "range", "sensor": "temperature", "value": 40.0}
-    tag = TagState("7", readings=(Reading("temperature", math.nan, BEGUN_S * 10**9),))
-    page = page_of(alarms=[alarm(reason={**hot, "limit": 35.0}, worst=40.25)], tags=[tag])
-    assert "7 06:01 40.3 °C (critical)" in page
+def test_a_length_has_no_zero_and_a_share_is_whole_only_if_all_is_there() -> None:
     lengths = {3_600: "1 h", 86_400 + 59 * 60: "1 d", 90_061: "1 d 1 h", 59: "59 s"}
     for length, text in lengths.items():
-        page = page_of(silences=[{"tag_id": "", "from": at(300), "to": at(300 + length)}])
+        page = page_of(silences=[{"from": at(300), "to": at(300 + length)}])
         assert f" {text} Tags not scanned" in page
     counts = body(8)["counts"] | {"tags": 201, "tags_scanned": 200}
     assert "200 of 201 (99 %)" in page_of(counts=counts)
-
-
-def test_active_alarms_that_share_a_cause_are_below_one_heading() -> None:
-    warm = {"verdict": "stressed", "kind": "range", "sensor": "temperature", "value": 30.0}
-    many = [alarm(tag_id=str(n), reason={**warm, "limit": 26.0}) for n in range(5)]
-    page = page_of(alarms=[alarm(), *many])
-    active = page.partition("Alarms still active ")[2]
-    assert "Temperature too high: 5 Temperature too high 0 06:01" in active
-    # The worst comes first, and few need no heading.
-    assert active.index("Pest seen") < active.index("Temperature too high: 5")
-    assert "Pest seen:" not in active
-    over = [{**each, "cleared_at": at(120)} for each in many]
-    assert "Temperature too high: 5" not in page_of(alarms=over)

@@ -130,7 +130,6 @@ def test_a_refusal_comes_from_the_service_with_its_reason(
     assert response.status_code == 400
     assert complaint in body["error_message"]
     assert set(body) == set(GetEstimateResponse.model_fields)
-    assert live.get("/api/estimate", headers={"Accept": "text/css"}, **QUERY).status_code == 406
 
 
 TAGS = {"a": (0.5, 0.5), "b": (1.75, 2.75), "c": (0.5, 2.0), "d": (2.5, 1.0)}
@@ -210,9 +209,6 @@ def test_a_changed_tag_is_reported_left_out_and_judged(graded: Bridge) -> None:
     )
     assert reason["value"] == odd["measured"]
     assert now_s() - 4 * 1800 <= reason["since"]["sec"] < now_s()
-    metrics = graded.get("/metrics").text
-    assert "lupin_estimate_trusted{" not in metrics, "four tags are too few to say"
-    assert 'lupin_estimate_fit_failing{sensor="temperature"} 0.0' in metrics
 
 
 def test_the_hit_rate_is_reported_for_all_sensors_or_for_one(graded: Bridge) -> None:

@@ -1,7 +1,6 @@
 """The export: as fast as its reader, within its limits, and never complete when it is not."""
 
 import asyncio
-import json
 import math
 import sys
 from collections import deque
@@ -102,8 +101,6 @@ async def test_parquet_has_the_same_rows_with_units_and_coordinates(domain: int)
         schema = table.schema
         assert schema.field("value").metadata[b"units"] == b"ppm"
         assert schema.field("x_m").metadata[b"units"] == b"m"
-        assert schema.metadata[b"to"] == b"1970-01-01T00:00:09.000000000Z"
-        assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
 
 
 async def test_parquet_without_its_package_is_refused_with_how_to_install_it(
@@ -144,7 +141,6 @@ async def test_a_client_has_one_export_and_a_disconnect_frees_its_place(domain: 
             refused = await it.http.get(PATH)
             assert (refused.status_code, refused.headers["retry-after"]) == (429, "5")
             assert refused.json() == {"detail": "127.0.0.1 has 1 export under way, the limit"}
-            assert (await it.http.get("/metrics")).text.count("lupin_exports_running 1.0") == 1
             # It computes nothing while its reader is slow.
             assert it.bridge.admission.being_computed == 0
         await until(lambda: it.bridge.admission.exporting == 0, "its place")

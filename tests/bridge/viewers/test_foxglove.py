@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import RosTime, Sample, TwinNames, topics_of
+from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.viewers import foxglove as module
 from lupin_bridge.viewers.foxglove import (
@@ -29,7 +29,7 @@ NAMES = TwinNames(
     *("/n/twin/field/", "/n/twin/tags", "/n/twin/planters"),
 )
 OWN = ["/n/twin/state", "/o", "/d", "/map", "/diag"]
-POINTS, MARKERS = "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray"
+POINTS = "sensor_msgs/msg/PointCloud2"
 
 
 class Source:
@@ -38,7 +38,6 @@ class Source:
     def __init__(self, published: Mapping[str, str] = {}) -> None:  # never changed
         self.relay = self
         self.now_published = dict(published)
-        self.now = RosTime(5, is_simulated=False)
         self.looks = 0
         self.answers = asyncio.Event()
         self.answers.set()
@@ -58,20 +57,11 @@ class Source:
             raise TwinUnavailableError("the ROS thread has ended")
         return {name: kind for name, kind in self.now_published.items() if is_wanted(name, kind)}
 
-    async def time(self) -> RosTime:
-        return self.now
-
 
 @pytest.fixture(autouse=True)
 def schemas(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The text of every type except one, whatever is installed."""
-
-    def text(type_name: str) -> str:
-        if type_name == MARKERS:
-            raise LookupError(f"the message type {type_name} is not installed")
-        return f"# {type_name}"
-
-    monkeypatch.setattr(module, "schema_text", text)
+    """The text of every type, whatever is installed."""
+    monkeypatch.setattr(module, "schema_text", lambda type_name: f"# {type_name}")
 
 
 def offer_of(source: Source) -> Offer:
@@ -101,9 +91,7 @@ async def test_the_topics_of_a_twin_and_the_published_layers_are_offered() -> No
     assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
 
 
-async def test_layers_are_bounded_and_a_topic_without_a_definition_is_left_out_and_warned_about(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+async def test_layers_are_bounded_and_end_with_ros() -> None:
     source = Source({f"/n/twin/field/s{n:03}": POINTS for n in range(MAX_LAYERS + 1)})
     offer = offer_of(source)
     await offer.look()
@@ -111,54 +99,31 @@ async def test_layers_are_bounded_and_a_topic_without_a_definition_is_left_out_a
     source.has_ended = True
     await offer.look()
     assert topics(offer) == OWN
-    offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
-    for _ in range(3):
-        await offer.look()
-    assert topics(offer) == OWN
-    assert caplog.text.count("is not offered to viewers") == 1
 
 
 async def test_followers_get_only_changes_and_an_id_is_never_reused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "POLL_S", 0.0)
-    monkeypatch.setattr(module, "TICK_S", 0.0)
-
     source = Source({"/n/twin/field/a": POINTS})
     offer = offer_of(source)
     await offer.look()
-    news: list[int | None] = []
-    async with offer.followed(news.append):
+    news: list[list[str]] = []
+    async with offer.followed(lambda: news.append(topics(offer))):
         looks = source.looks
         await until(lambda: source.looks > looks + 2, "some discoveries")
         assert news == []
         del source.now_published["/n/twin/field/a"]
-        await until(lambda: news == [None], "the layer's end")
-        assert topics(offer) == OWN
+        await until(lambda: news == [OWN], "the layer's end")
         source.now_published["/n/twin/field/a"] = POINTS
-        await until(lambda: news == [None, None], "the layer again")
+        await until(lambda: news == [OWN, [*OWN, "/n/twin/field/a"]], "the layer again")
         assert max(offer.channels) == len(OWN) + 2
-        source.now = RosTime(0, is_simulated=True)
-        await until(lambda: offer.has_time, "simulated time")
-        source.now = RosTime(7, is_simulated=True)
-        await until(lambda: news[2:] == [7], "its first moment")
-        looks = source.looks
-        await until(lambda: source.looks > looks + 2, "some discoveries")
-        assert news[2:] == [7], "time that stands is sent once"
-        source.now = RosTime(8, is_simulated=True)
-        await until(lambda: news[2:] == [7, 8], "and the next")
-        late: list[int | None] = []
-        async with offer.followed(late.append):
-            assert late == [8], "and once to whoever comes meanwhile"
 
     def following() -> list[str]:
         names = (task.get_name() for task in asyncio.all_tasks())
         return [name for name in names if name.startswith("foxglove")]
 
     await until(lambda: not following(), "an end of looking: nobody follows")
-    next_one: list[int | None] = []
-    async with offer.followed(next_one.append):
-        await until(lambda: next_one == [8], "the time that still stands")
 
 
 def test_the_layout_shows_offered_topics_and_each_of_its_panels_has_a_place() -> None:
@@ -240,9 +205,7 @@ def test_subscriptions_are_limited(stage: Stage) -> None:
     assert stage.subscribe((199, 199)).begun
 
 
-def test_of_each_subscription_the_latest_message_waits_in_turn_behind_the_latest_time(
-    stage: Stage,
-) -> None:
+def test_of_each_subscription_the_latest_message_waits_in_turn(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
     for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
         stage.session.put(key, Sample(payload, 5))
@@ -253,9 +216,6 @@ def test_of_each_subscription_the_latest_message_waits_in_turn_behind_the_latest
     assert stage.written() == [], "who has unsubscribed hears nothing more"
     stage.subscribe((1, 10))
     stage.session.put(1, Sample(b"a", 5))
-    stage.session.time_ns = 7
-    stage.session.time_ns = 8
-    assert stage.session.next() == (b"\x02\x08" + bytes(7), b"")
     assert stage.written() == [(1, b"a")]
 
 

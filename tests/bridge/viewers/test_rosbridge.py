@@ -185,8 +185,6 @@ class Everything:
         "level": ("octet", b"\x02"),
         "ratio": ("double", math.nan),
         "cells": ("sequence<int8>", array("b", [-1, 0, 100])),
-        "image": ("sequence<uint8>", array("B", [1, 2, 255])),
-        "key": ("uint8[2]", np.array([7, 8], np.uint8)),
         "points": ("sequence<float, 9>", array("f", [0.5, math.inf])),
         "matrix": ("double[2]", np.array([1.0, 2.0])),
         "names": ("sequence<string>", ["a", "b"]),
@@ -201,7 +199,7 @@ class Everything:
         return {name: kind for name, (kind, _) in cls.FIELDS.items()}
 
 
-def test_json_has_lists_base64_for_bytes_and_null_for_what_is_not_finite() -> None:
+def test_json_has_lists_and_null_for_what_is_not_finite() -> None:
     assert json.loads(json_of(Everything())) == {
         "stamp": {"sec": 5, "nanosec": 6},
         "text": "é",
@@ -209,8 +207,6 @@ def test_json_has_lists_base64_for_bytes_and_null_for_what_is_not_finite() -> No
         "level": 2,
         "ratio": None,
         "cells": [-1, 0, 100],
-        "image": "AQL/",
-        "key": "Bwg=",
         "points": [0.5, None],
         "matrix": [1.0, 2.0],
         "names": ["a", "b"],
@@ -223,12 +219,6 @@ def test_a_list_of_any_length_is_complete(monkeypatch: pytest.MonkeyPatch, lengt
     cells = array("b", [number % 101 - 1 for number in range(length)])
     monkeypatch.setitem(Everything.FIELDS, "cells", ("sequence<int8>", cells))
     assert json.loads(json_of(Everything()))["cells"] == cells.tolist()
-
-
-def test_a_text_that_is_not_unicode_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(Everything.FIELDS, "text", ("string", "\udcff"))
-    with pytest.raises(ValueError, match="UTF-8"):
-        json_of(Everything())
 
 
 INPUT = Topic("a/msg/B", "", "/in", depth=3)
@@ -254,7 +244,7 @@ class Relay:
             raise ValueError("not a message")
         if sample.data == b"odd":
             raise ZeroDivisionError
-        return SimpleMessage("\ud800" if sample.data == b"half" else sample.data.decode())
+        return SimpleMessage(sample.data.decode())
 
     def publish(self, *texts: str) -> None:
         for text in texts:
@@ -364,15 +354,14 @@ async def test_an_unserialisable_message_is_an_error_for_the_client(
     await until(lambda: bool(relay.ears), "it to listen")
     relay.publish("odd", "odd", "bad")
     await until(lambda: len(client.frames) == 3, "all of them")
-    relay.publish("half", "good")
-    await until(lambda: len(client.frames) == 5, "the next ones")
-    odd, _, bad, half, good = client.frames
+    relay.publish("good")
+    await until(lambda: len(client.frames) == 4, "the next one")
+    odd, _, bad, good = client.frames
     assert b"an internal error" in odd
     assert b"a message of topic 'in' is left out: not a message" in bad
-    assert b"a message of topic 'in' is left out: " in half
     assert good == json_frame("good")
     assert caplog.text.count("Traceback") == 1, "what persists is logged once"
     relay.refuses = True
     client.feeding.follow({"in": feed()}, "in")
-    await until(lambda: len(client.frames) == 6, "the refusal")
+    await until(lambda: len(client.frames) == 5, "the refusal")
     assert b"no such type" in client.frames[-1]

@@ -8,13 +8,11 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.past import (
     HOUR_NS,
     MAX_READINGS,
-    MAX_WRITES,
     SLOT_NS,
     Grid,
     NotRemembered,
     PastRefused,
     SeriesRequest,
-    WritesRequest,
     check_moment,
     error_of,
     grid,
@@ -24,10 +22,7 @@ from lupin_twin.core.past import (
 REQUESTED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
 
 
-def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
-    """A query of a series, or of one of the kinds of write."""
-    if given.keys() & {"reach_s", "after", "max_count"}:
-        return WritesRequest(**given)
+def request(given: dict[str, Any]) -> SeriesRequest:
     return SeriesRequest(**(REQUESTED | given))
 
 
@@ -52,12 +47,6 @@ def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
         ({"start_ns": 5, "end_ns": 4}, "end 4 ns is before start 5 ns"),
         ({"max_points": 0}, "max_points is 0, the limits are 1 and 40000"),
         ({"max_points": MAX_READINGS + 1}, "max_points is 40001"),
-        ({"reach_s": -0.1}, "reach_s is -0.1"),
-        ({"reach_s": 1.1e9}, "reach_s is 1100000000"),
-        ({"reach_s": float("nan")}, "reach_s is nan"),
-        ({"after": 2**63}, "after is 9223372036854775808, the limit is 9223372036854775807"),
-        ({"max_count": 0}, "max_count is 0"),
-        ({"max_count": MAX_WRITES + 1}, f"max_count is {MAX_WRITES + 1}"),
     ],
 )
 def test_an_invalid_query_is_refused(wrong: dict[str, Any], says: str) -> None:
@@ -74,8 +63,6 @@ def test_an_invalid_query_is_refused(wrong: dict[str, Any], says: str) -> None:
         {"max_points": 1},
         {"max_points": MAX_READINGS},
         {"tag_id": "7" * MAX_TEXT_LENGTH, "sensor_type": "t" * MAX_TEXT_LENGTH},
-        {"after": 0, "reach_s": 1e9, "max_count": MAX_WRITES},
-        {"after": 2**63 - 1, "max_count": 1},
     ],
 )
 def test_the_limits_themselves_are_allowed(right: dict[str, Any]) -> None:

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from lupin_twin.core.past import (
     EVERY_TAG,
     MAX_POINTS,
-    MAX_WRITES,
     Event,
     SeriesRequest,
     WritesRequest,
@@ -128,7 +127,7 @@ def check_export(life: Life, connection: Any, period: Period, tag: str | None) -
 
 def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> None:
     """Both engines give the same; a query of a period gives that part of all writes."""
-    whole = WritesRequest(max_count=MAX_WRITES)
+    whole = WritesRequest()
     every = writes(local, whole).writes
     end_ns = random.choice([END, *(write.stamp_ns for write in every)])  # at the very end
     sensors = frozenset({"temperature", "co2"})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import replace
 from datetime import UTC
 from itertools import pairwise
@@ -19,7 +18,6 @@ from lupin_bridge.judge.day import ClockDay
 from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
-from lupin_bridge.past.report_page import ReportPage
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import SHELVE, Note
 from lupin_twin.core.past import PastWrite, RunSpan
@@ -78,15 +76,6 @@ def test_no_scans_is_reported_only_as_far_as_the_log_is_complete(living: Living)
             found = report(life.connection, BEGUN, END, journal)
             assert [ns(it["to"]) for it in found["silences"]] == silences
             assert [it["reason"]["kind"] for it in found["alarms"]] == stops
-
-
-def test_on_paper_an_alarm_of_a_daily_quantity_has_its_last_value(living: Living) -> None:
-    scans = [scan(at_ns=BEGUN + 60 * hour * MINUTE, temperature=40.0) for hour in range(72)]
-    period = scans[50].stamp_ns, scans[71].stamp_ns
-    with living([("rows", scans)]) as life:
-        answer = answered_by(life.connection, ReportPage(*period, CRITERIA, JOURNAL))
-    (row,) = re.findall("<tr[^>]*><td>24-h mean.*?</tr>", answer.decode())
-    assert re.findall("<td[^>]*>(.*?)</td>", row)[3] == "40.0\u00a0°C (06:00)"
 
 
 def test_hundreds_of_alarms_of_one_tag_are_all_counted(living: Living) -> None:
@@ -201,31 +190,18 @@ def check_sensors(found: list[dict[str, Any]], scans: list[PastWrite]) -> None:
 def check_silences(
     found: list[dict[str, Any]], reported: list[PastWrite], start_ns: int, end_ns: int
 ) -> None:
-    scans = {
-        tag_id: sorted({it.stamp_ns for it in reported if (it.tag_id, it.kind) == (tag_id, 0)})
+    scans = [
+        sorted({it.stamp_ns for it in reported if (it.tag_id, it.kind) == (tag_id, 0)})
         for tag_id in {it.tag_id for it in reported}
-    }
-
-    def gaps(
-        stamps: list[int], tags: list[list[int]], pauses: list[tuple[int, int]]
-    ) -> list[tuple[int, int]]:
-        limit = longest(tags)
-        return [
-            (a, b)
-            for a, b in pairwise([*stamps, end_ns])
-            if b - a - sum(max(0, min(b, d) - max(a, c)) for c, d in pauses) > limit
-        ]
-
-    whole = gaps([it.stamp_ns for it in reported], [*scans.values()], [])
-    right = {("", max(a, start_ns), b) for a, b in whole if b > start_ns}
-    for tag_id, mine in scans.items():
-        right |= {
-            (tag_id, max(a, start_ns), b) for a, b in (gaps(mine, [mine], whole) if mine else [])
-            if b > start_ns
-        }  # fmt: skip
-    if not reported:
-        right = set()
-    assert {(it["tag_id"], ns(it["from"]), ns(it["to"])) for it in found} == right
+    ]
+    limit = longest(scans)
+    stamps = [it.stamp_ns for it in reported]
+    right = [
+        (max(a, start_ns), b)
+        for a, b in pairwise([*stamps, end_ns] if stamps else [])
+        if b - a > limit and b > start_ns
+    ]
+    assert [(ns(it["from"]), ns(it["to"])) for it in found] == right
 
 
 def plain(alarm: dict[str, Any]) -> Plain:

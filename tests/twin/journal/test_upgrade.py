@@ -108,7 +108,7 @@ def test_the_answers_are_those_of_the_old_file(name: str, tmp_path: Path) -> Non
     upgrade(path, lambda share: None)
     assert old_version(path) is None
     with closing(open_reader(path)) as connection:
-        assert list(find_all_damage(connection, lambda what, share: None)) == []
+        assert list(find_all_damage(connection)) == []
         for query, right in answers(name):
             found = answer(connection, query)
             assert same(found, right) or is_another(name, query), query
@@ -196,7 +196,7 @@ def test_killed_again_and_again_it_is_completed_without_doing_anything_twice(
         closing(open_reader(path)) as connection,
         closing(open_reader(tmp_path / "whole" / "j.sqlite")) as whole,
     ):
-        assert list(find_all_damage(connection, lambda what, share: None)) == []
+        assert list(find_all_damage(connection)) == []
         for table in TABLES:
             rows, at_once = (
                 log.execute(f"SELECT * FROM {table}").fetchall() for log in (connection, whole)

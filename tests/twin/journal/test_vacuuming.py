@@ -23,7 +23,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def small(path: Path) -> tuple[int, int]:
-    return vacuum(path, "a test", lambda what, share: None)
+    return vacuum(path, "a test")
 
 
 def test_the_file_shrinks_and_its_content_stays(path: Path) -> None:
@@ -52,7 +52,7 @@ def test_it_is_refused_while_the_file_is_read(path: Path) -> None:
 def test_a_disk_that_fills_leaves_the_file_unchanged(path: Path) -> None:
     append(path, [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000, 9000)])
     rows = known(path)
-    code = "from lupin_twin.journal.rebuild import vacuum; vacuum(path, 'a test', print)"
+    code = "from lupin_twin.journal.rebuild import vacuum; vacuum(path, 'a test')"
     fail_on_a_full_disk(code, path, 100_000)
     assert is_whole(path)
     assert known(path) == rows

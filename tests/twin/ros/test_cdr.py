@@ -82,7 +82,7 @@ def test_every_message_that_ros_writes_is_accepted_to_its_last_byte(
     assert message_type not in OURS or end == len(data)
 
 
-@settings(max_examples=12)  # each with hundreds of lies
+@settings(max_examples=40)  # a state has thousands of lies: some of each
 @given(st.sampled_from(OURS), st.randoms(use_true_random=False))
 def test_accepted_bytes_can_be_read_by_ros_and_unreadable_ones_are_refused(
     message_type: Any, chance: random.Random
@@ -93,7 +93,8 @@ def test_accepted_bytes_can_be_read_by_ros_and_unreadable_ones_are_refused(
         SHAPES[message_type].check(data[:cut])
     longer = data + chance.randbytes(chance.randrange(20))
     assert SHAPES[message_type].check(longer) == len(data)
-    for lie in lies(data):
+    told = list(lies(data))
+    for lie in chance.sample(told, min(len(told), 50)):
         try:
             SHAPES[message_type].check(lie)
         except MalformedError:

@@ -27,7 +27,7 @@ from tests.support.proc_stat import cpu_s
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer, latched
 
-LAYERS = "layers:=[temperature, soil moisture, co2, humidity, light, soil_moisture]"
+LAYERS = "layers:=[temperature, co2, humidity, light, soil_moisture]"
 SENSORS = Path("backend/lupin_bridge/sensors.json")
 RVIZ = Path("ros_node/lupin_twin/rviz/twin.rviz")
 # What each display of RViz reads.
@@ -36,7 +36,7 @@ READS = {
     "rviz_default_plugins/PointCloud2": "sensor_msgs/msg/PointCloud2",
     "rviz_default_plugins/MarkerArray": "visualization_msgs/msg/MarkerArray",
 }
-CO2, SOIL = "/gh1/twin/field/co2", "/gh1/twin/field/soil_x20_moisture"
+CO2, SOIL = "/gh1/twin/field/co2", "/gh1/twin/field/soil_moisture"
 TEMPERATURE = "/gh1/twin/field/temperature"
 TAGS, PLANTERS = "/gh1/twin/tags", "/gh1/twin/planters"
 KINDS = dict.fromkeys((CO2, SOIL, TEMPERATURE), PointCloud2) | dict.fromkeys(
@@ -121,7 +121,7 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
     domain, _, robot = greenhouse
     robot.receive_diagnostics()
     for x in (0, 4):
-        observe(robot, scan(f"t{x}", {"co2": 400.0 + x, "soil moisture": 30.0}, (x, 0)))
+        observe(robot, scan(f"t{x}", {"co2": 400.0 + x, "soil_moisture": 30.0}, (x, 0)))
     box = box_of((0.0, 0.0), (4.0, 0.0))
     query: dict[str, Any] = {"sensor_type": "co2", **box}
     field = robot.until(
@@ -131,7 +131,7 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
     # Something is known, without subscribers: nothing was computed.
     robot.reports(CO2, 0)
     robot.reports(TAGS, 0)
-    assert robot.said["message"] == "0 of 8 topics have subscribers"
+    assert robot.said["message"] == "0 of 7 topics have subscribers"
 
     with Viewer(domain, "viewer") as viewer:
         viewer.watch(CO2)
@@ -158,12 +158,11 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
         observe(robot, scan("t0", {"co2": 900.0}))
         changed = viewer.latest(CO2, lambda m: cells(m)[:, 3].max() == 900.0)
         assert cells(changed).shape == found.shape
-        # A sensor whose name is not valid in ROS.
         viewer.watch(SOIL)
         assert (cells(viewer.latest(SOIL))[:, 3] == 30.0).all()
         viewer.unwatch(CO2)
         robot.until(
-            lambda: robot.said["message"] == "1 of 8 topics have subscribers", "one who looks"
+            lambda: robot.said["message"] == "1 of 7 topics have subscribers", "one who looks"
         )
         observe(robot, scan("t0", {"co2": 700.0}))
         viewer.latest(SOIL)  # the same tags at another revision

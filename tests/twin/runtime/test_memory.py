@@ -3,11 +3,10 @@
 import sqlite3
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import CancelledError, ProcessPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import replace
-from datetime import UTC, datetime
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -16,7 +15,7 @@ import pytest
 
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.core.state import Flower, Inspection, Pin, Reading, Scan, TwinStore, Write
+from lupin_twin.core.state import Flower, Inspection, Pin, Reading, Scan, TwinStore
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.paths import journal_path, state_folder
 from lupin_twin.journal.runs import Clock
@@ -104,35 +103,15 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
     assert is_whole(path)
 
 
-def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
-    def reported(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
+def test_a_restored_state_is_logged_once(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    for tags, writes in ((0, WRITES), (3, ())):
         memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4))
-        message = [memory.follow(clock) for clock in clocks]
+        said = [memory.follow(Clock(NOW + at_s * S, NOW + at_s * S, False)) for at_s in (5, 6)]
+        assert said == [f"journal {path}: restored {tags} tags", None]
         for write in writes:
             assert memory.apply(write, NOW) is None
         memory.close()
-        return message
-
-    def wall(at_s: int) -> Clock:
-        return Clock(NOW + at_s * S, NOW + at_s * S, is_simulated=False)
-
-    def sim(at_s: int) -> Clock:
-        return Clock(at_s * S, NOW + at_s * S, is_simulated=True)
-
-    path = tmp_path / "j.sqlite"
-    nothing = f"journal {path}: nothing to restore"
-    assert reported(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
-    [line] = reported(path, wall(9))
-    oldest = f"{datetime.fromtimestamp(PART.stamp_ns / S, UTC):%Y-%m-%dT%H:%M:%SZ}"
-    assert line == (
-        f"journal {path}: restored 3 tags with 3 positions, 3 readings, 1 inspections;"
-        f" the oldest observation is from {oldest}"
-    )
-    path = tmp_path / "simulated.sqlite"
-    reported(path, sim(5), writes=[at(SCAN, 4 * S)])
-    before, after = reported(path, sim(0), sim(6))
-    assert before is None
-    assert str(after).endswith("; the oldest observation is from second 4.000")
 
 
 def at(write: Scan | Inspection, stamp_ns: int) -> Scan | Inspection:

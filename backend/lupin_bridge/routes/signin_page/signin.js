@@ -3,7 +3,6 @@
 const form = document.querySelector('form');
 const person = document.querySelector('#name');
 const input = document.querySelector('#token');
-const others = document.querySelector('#others');
 const button = document.querySelector('button');
 const message = document.querySelector('#message');
 
@@ -27,7 +26,7 @@ const requestOf = (name, secret) =>
   name
     ? {
         headers: { 'Content-Type': 'application/json', 'X-Lupin-Twin': '1' },
-        body: JSON.stringify({ name, password: secret, ends_others: others.checked }),
+        body: JSON.stringify({ name, password: secret }),
       }
     : { headers: { Authorization: `Bearer ${secret}`, 'X-Lupin-Twin': '1' } };
 

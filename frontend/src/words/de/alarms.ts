@@ -130,8 +130,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    heldUntil: (status, isBelow, until) =>
-      until === null ? `noch ${status}` : `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
+    must: {
+      below: (limit) => `muss über ${limit} steigen`,
+      above: (limit) => `muss unter ${limit} sinken`,
+    },
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,
@@ -169,7 +171,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       temperature: { below: 'Heizen oder Lüftung schließen', above: 'Lüften oder schattieren' },
       co2: { below: 'CO₂ dosieren oder lüften', above: 'Lüften, CO₂-Dosierung prüfen' },
       light: { below: 'Assimilationslicht einschalten', above: 'Schattieren' },
-      soil_moisture: { below: 'Bewässern', above: 'Weniger bewässern, Drainage prüfen' },
+      soil_moisture: { below: 'Gießen', above: 'Weniger gießen, Drainage prüfen' },
     },
     air: { damp: 'Lüften und heizen', dry: 'Befeuchten oder schattieren' },
     range: 'Klimaregelung prüfen',
@@ -183,8 +185,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Nach dem Roboter sehen',
     other: 'Vor Ort prüfen',
   },
-  todoPestAgain: 'Zum Beheben nochmals kontrollieren',
-  todoWell: 'Mit der nächsten guten Messung behoben',
+  todoPestAgain: 'Nochmals kontrollieren',
+  todoWell: 'Nächste gute Messung abwarten',
   todoAlso: (tags) => (tags === 1 ? 'auch Messpunkt' : 'auch Messpunkte'),
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
@@ -230,6 +232,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
   side: { below: 'tief', above: 'hoch' },
-  below: 'unter Ideal',
-  above: 'über Ideal',
+  below: 'zu niedrig',
+  above: 'zu hoch',
 };

@@ -19,10 +19,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   predicted: (inside, scans) =>
     `${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
   predictedNone: 'Noch mit keiner Messung verglichen',
-  predictedDay: (inside, scans) =>
-    `Letzter Tag: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
-  predictedWeek: (inside, scans) =>
-    `letzte Woche: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
   fitProblem: (reason) => `Das Modell passt nicht gut zu diesem Gewächshaus: ${reason}`,
   notTrusted: (count) => `Fehlerbereich zu eng: Nur ${count} statt 9 von 10 Messungen lagen darin.`,
   near: (count) =>

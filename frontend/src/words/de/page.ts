@@ -68,12 +68,11 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Eine Nachricht vom Server war nicht lesbar und wurde verworfen.'
       : `${count} Nachrichten vom Server waren nicht lesbar und wurden verworfen.`,
-  unreadLast: (why) => `Zuletzt: ${why}`,
   paused: 'Die Zeit ist angehalten.',
   pausedHint: 'Simulation oder Aufzeichnung sind angehalten; die Messwerte altern nicht.',
   mixture:
     'Mehr als ein Zwilling sendet. Die Seite zeigt ein Gemisch: Bitte alle bis auf einen beenden.',
-  inputProblem: 'Nicht alle Daten kommen hier an.',
+  inputProblem: 'Ein Teil der Daten kommt nicht an.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
   journal: {
@@ -135,9 +134,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   unit: 'Temperatur',
   theme: 'Darstellung',
   themes: { system: 'System', light: 'Hell', dark: 'Dunkel' },
-  copyLink: 'Link zu dieser Ansicht kopieren',
-  linkCopied: 'Link kopiert',
-  linkInBar: 'In der Adresszeile steht der Link zu dieser Ansicht',
   savePng: 'Karte als PNG speichern',
   saveCsv: 'Tabelle als CSV speichern',
   saveCsvShort: 'CSV',
@@ -145,7 +141,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Drucken',
   kiosk: 'Wandanzeige',
   kioskLeave: 'Beenden',
-  cycleNext: (sensor, time) => `danach: ${sensor} in ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} wird ignoriert: möglich sind ${least} bis ${most} Sekunden.`,
   help: 'Tastenkürzel',
@@ -189,8 +184,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['C', 'Verlauf des gewählten Messpunkts'],
       ['L', 'Zurück zu Live'],
       ['Leertaste', 'Rückblick abspielen oder anhalten'],
-      ['U', '°C oder °F'],
-      ['T', 'Hell oder dunkel'],
       ['Esc', 'Schließen, dann zurück zu Live'],
       ['?', 'Diese Liste'],
     ],

@@ -134,11 +134,11 @@ export const HEALTH = {
   /** Why a tag or the greenhouse has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
-    /** A value that was out of range keeps its status until it is well within (hysteresis). Null: it reads like `until`. */
-    heldUntil: (status: string, isBelow: boolean, until: string | null): string =>
-      until === null
-        ? `still ${status}`
-        : `${status} until ${isBelow ? 'below' : 'above'} ${until}`,
+    /** A value that was out of range keeps its status until it is well within (hysteresis). */
+    must: {
+      below: (limit: string): string => `must rise above ${limit}`,
+      above: (limit: string): string => `must fall below ${limit}`,
+    },
     /** For a value beyond its limit that rounds to the limit. */
     just: {
       below: (limit: string): string => `just below ${limit}`,
@@ -177,7 +177,7 @@ export const HEALTH = {
       temperature: { below: 'Heat, or close the vents', above: 'Ventilate or shade' },
       co2: { below: 'Dose CO₂ or ventilate', above: 'Ventilate; check the CO₂ dosing' },
       light: { below: 'Switch on the lamps', above: 'Shade' },
-      soil_moisture: { below: 'Water', above: 'Water less; check the drainage' },
+      soil_moisture: { below: 'Irrigate', above: 'Irrigate less; check the drainage' },
     },
     air: { damp: 'Ventilate and heat', dry: 'Mist, damp down or shade' },
     range: 'Check the climate settings',

@@ -4,7 +4,7 @@ import { counted, whole } from './counted';
 export const ESTIMATE = {
   about: 'What ± means',
   aboutText:
-    'Nine of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
+    'Nine out of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
     'depends on the distance and age of the readings, and on the time of day. The longer nothing ' +
     'is measured, the larger the ±.',
   onItsWay: 'Loading the estimate',
@@ -18,16 +18,12 @@ export const ESTIMATE = {
   predicted: (inside: number, scans: number): string =>
     `${whole(inside)} of ${counted(scans, 'scan', 'scans')} within the predicted range`,
   predictedNone: 'No scan has been compared with it yet',
-  predictedDay: (inside: number, scans: number): string =>
-    `Last day: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
-  predictedWeek: (inside: number, scans: number): string =>
-    `last week: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
   fitProblem: (reason: string): string => `The model does not fit this greenhouse well: ${reason}`,
   notTrusted: (count: number): string =>
     `Error range is too narrow: only ${count} of 10 scans were within it, not 9.`,
   near: (count: number): string =>
-    count === 0 ? 'no tag near' : counted(count, 'tag near', 'tags near'),
-  oldest: (age: string): string => `oldest reading ${age}`,
+    count === 0 ? 'no tag nearby' : counted(count, 'tag nearby', 'tags nearby'),
+  oldest: (age: string): string => `oldest reading ${age} ago`,
   expected: (measured: string, expected: string): string =>
     `measured ${measured}, expected ${expected}`,
   leftOut: (sensor: string): string => `${sensor}: possible sensor fault, not used in the estimate`,

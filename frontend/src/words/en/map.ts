@@ -3,7 +3,6 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperature', 'Temp.'],
-  ['Humidity', 'RH'],
   ['Soil moisture', 'Soil'],
   ['Vapour pressure deficit', 'VPD'],
 ]);
@@ -44,7 +43,6 @@ export const MAP = {
   legendError: (error: string): string => `Typical error ${error}`,
   legendErrorHint:
     'Typical error between tags: each tag is estimated from all the others and compared with its own reading.',
-  legendErrorWorst: (tag: string, error: string): string => `Worst at tag ${tag}: ${error}.`,
   legendTransparent: 'Stronger colour: higher value. No colour: minimum.',
   legendMore: 'Details',
   legendHatched: 'Hatched: no data',
@@ -68,15 +66,6 @@ export const MAP = {
   pinLacking: 'no sensor',
   pinFailed: 'sensor failed',
   pinPest: 'pest seen',
-  range: 'Colour range',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Fixed',
-  rangeLow: 'Lowest',
-  rangeHigh: 'Highest',
-  rangeIdeal: 'Use ideal range',
-  rangeNotBelow: (high: string): string => `Must be below ${high}: not applied`,
-  rangeNotAbove: (low: string): string => `Must be above ${low}: not applied`,
-  rangeNoNumber: 'Not a number: not applied',
   fieldFailed: (reason: string): string =>
     `The heat map could not be loaded (${reason}); the page keeps trying.`,
 
@@ -85,10 +74,8 @@ export const MAP = {
     none: 'nothing',
     day: 'yesterday',
     week: 'a week ago',
-    own: 'the moment shown now',
   },
   compareEnd: 'Stop comparing',
-  compareMoment: 'The moment to compare with',
   difference: (sensor: string): string => `${sensor}: difference`,
   differenceLoading: 'Loading the difference',
   differenceNothing: (at: string): string => `No data for ${at}.`,
@@ -165,7 +152,6 @@ export const TAGS = {
   unclassified: 'not classified',
   tableButton: 'Columns and rows',
   tableColumns: 'Columns',
-  columnNoRoom: 'window too narrow',
   tableByArea: 'Group by area',
   areaNone: 'No area',
   trend: 'Trend',
@@ -183,16 +169,12 @@ export const TAGS = {
   cardGoneThen: 'The twin did not know this tag then.',
   cardShow: 'Show on map',
   cardMore: (count: number): string => `${count} more`,
-  cardHistory: (count: number, from: string, to: string): string =>
-    `Last ${count} readings, between ${from} and ${to}`,
   cardSource: 'Source',
   cardFixed: 'Fixed sensor',
   cardVisited: 'Visited by the robot',
   cardScanned: 'Last reading',
   cardInspected: 'Flowers inspected',
   cardLastAttempt: 'Last attempt',
-  cardAttempts: 'Last attempts',
-  cardAttemptKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
   cardArea: 'Area',
   cardPosition: 'Position',
 } as const;

@@ -52,7 +52,7 @@ export const PAGE = {
       'It is behind the recorded data. Until it is right, or for ten minutes, ages are unknown and recording waits.',
     never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
     stale: 'The twin has stopped sending. Check that it is running.',
-    thread_dead: 'The server has lost the twin and must be restarted.',
+    thread_dead: 'The server has lost contact with the twin and must be restarted.',
     shutting_down: 'The server is shutting down.',
   },
   /** For whoever maintains the system; empty: nothing to add. */
@@ -70,11 +70,10 @@ export const PAGE = {
     count === 1
       ? 'A message from the server could not be read and was dropped.'
       : `${count} messages from the server could not be read and were dropped.`,
-  unreadLast: (why: string): string => `Most recent: ${why}`,
   paused: 'Time is paused.',
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
   mixture: 'More than one twin sends data. The page shows a mixture of them: stop all but one.',
-  inputProblem: 'Not all data arrives here.',
+  inputProblem: 'Some data is not received.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last few minutes.`,
   /** For a journal that does not record: the problem, and what to do. */
@@ -138,9 +137,6 @@ export const PAGE = {
   unit: 'Temperature',
   theme: 'Theme',
   themes: { system: 'System', light: 'Light', dark: 'Dark' },
-  copyLink: 'Copy link to this view',
-  linkCopied: 'Link copied',
-  linkInBar: 'The link is in the address bar',
   savePng: 'Save map as PNG',
   saveCsv: 'Save table as CSV',
   saveCsvShort: 'CSV',
@@ -148,7 +144,6 @@ export const PAGE = {
   print: 'Print',
   kiosk: 'Wall screen',
   kioskLeave: 'Exit',
-  cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
     `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,
   help: 'Keyboard shortcuts',
@@ -168,7 +163,7 @@ export const PAGE = {
   emptyNoTagsMore: '“lupin-twin demo” shows a simulated patrol.',
   emptyNoPins: 'No tag has a position yet',
   emptyNoPinsHint: 'All tags are listed in the table; a pin appears with the first good scan.',
-  emptyNoReading: (sensor: string): string => `No pinned tag has a reading of ${sensor} yet`,
+  emptyNoReading: (sensor: string): string => `No readings on the map yet: ${sensor}`,
   emptyNoReadingHint: 'Choose another sensor, or wait for the robot to scan more tags.',
   emptyNoMap: 'No floor plan yet',
   emptyNoMapMore: 'The robot has not sent its SLAM map, which comes on /map.',
@@ -188,8 +183,6 @@ export const PAGE = {
       ['C', 'Charts of the chosen tag'],
       ['L', 'Back to live'],
       ['Space', 'Play or pause the past'],
-      ['U', '°C or °F'],
-      ['T', 'Light or dark'],
       ['Esc', 'Close, then back to live'],
       ['?', 'This list'],
     ],

@@ -130,10 +130,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
-    heldUntil: (status, isBelow, until) =>
-      until === null
-        ? `aún ${status}`
-        : `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
+    must: {
+      below: (limit) => `debe superar ${limit}`,
+      above: (limit) => `debe bajar de ${limit}`,
+    },
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,
@@ -191,8 +191,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Revisar el robot',
     other: 'Comprobar in situ',
   },
-  todoPestAgain: 'Revisar otra vez para resolverla',
-  todoWell: 'Queda resuelta con la próxima medición buena',
+  todoPestAgain: 'Revisar otra vez',
+  todoWell: 'Esperar otra medición buena',
   todoAlso: (tags) => (tags === 1 ? 'también punto' : 'también puntos'),
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
@@ -238,6 +238,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'por debajo del límite' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'por encima del límite' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
-  below: 'bajo el ideal',
-  above: 'sobre el ideal',
+  below: 'por debajo',
+  above: 'por encima',
 };

@@ -18,10 +18,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   predicted: (inside, scans) =>
     `${whole(inside)} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
   predictedNone: 'Aún no se ha comparado con ninguna medición',
-  predictedDay: (inside, scans) =>
-    `Último día: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
-  predictedWeek: (inside, scans) =>
-    `última semana: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
   fitProblem: (reason) => `El modelo no se ajusta bien a este invernadero: ${reason}`,
   notTrusted: (count) =>
     `Margen de error demasiado estrecho: solo acertó en ${count} de 10 mediciones, no en 9.`,

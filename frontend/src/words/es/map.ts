@@ -5,9 +5,9 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperatura', 'Temp.'],
-  ['Humedad relativa', 'HR'],
+  ['Humedad relativa (HR)', 'HR'],
   ['Humedad del sustrato', 'Sustrato'],
-  ['Déficit de presión de vapor', 'DPV'],
+  ['Déficit de vapor (DPV)', 'DPV'],
   ['Punto de rocío', 'P. de rocío'],
 ]);
 
@@ -47,7 +47,6 @@ export const MAP: In<typeof EN.MAP> = {
   legendError: (error) => `Error habitual ${error}`,
   legendErrorHint:
     'Error habitual entre los puntos: cada punto se estima a partir de los demás y se compara con su propia lectura.',
-  legendErrorWorst: (tag, error) => `El mayor, en el punto ${tag}: ${error}.`,
   legendTransparent: 'Color más intenso: valor más alto. Sin color: el mínimo.',
   legendMore: 'Detalles',
   legendHatched: 'Rayado: sin datos',
@@ -69,15 +68,6 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'sin sensor',
   pinFailed: 'sensor averiado',
   pinPest: 'plaga detectada',
-  range: 'Escala de colores',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Fija',
-  rangeLow: 'Mínimo',
-  rangeHigh: 'Máximo',
-  rangeIdeal: 'Usar el rango ideal',
-  rangeNotBelow: (high) => `Debe ser inferior a ${high}: no se aplica`,
-  rangeNotAbove: (low) => `Debe ser superior a ${low}: no se aplica`,
-  rangeNoNumber: 'No es un número: no se aplica',
   fieldFailed: (reason) =>
     `No se pudo cargar el mapa de calor (${reason}); la página lo sigue intentando.`,
 
@@ -86,10 +76,8 @@ export const MAP: In<typeof EN.MAP> = {
     none: 'nada',
     day: 'ayer',
     week: 'hace una semana',
-    own: 'el momento mostrado',
   },
   compareEnd: 'Dejar de comparar',
-  compareMoment: 'El momento con el que se compara',
   difference: (sensor) => `${sensor}: diferencia`,
   differenceLoading: 'Cargando la diferencia',
   differenceNothing: (at) => `Sin datos de ${at}.`,
@@ -128,7 +116,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   },
   pest: 'Plaga',
   pestCount: (count) => counted(count, 'individuo', 'individuos'),
-  notOnMap: 'Sin lugar',
+  notOnMap: 'Sin posición',
   notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
   farOff: 'Demasiado lejos, fuera del mapa',
   farOffLong: (place) =>
@@ -165,7 +153,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   unclassified: 'sin clasificar',
   tableButton: 'Columnas y filas',
   tableColumns: 'Columnas',
-  columnNoRoom: 'ventana demasiado estrecha',
   tableByArea: 'Agrupar por zona',
   areaNone: 'Sin zona',
   trend: 'Tendencia',
@@ -182,15 +169,12 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardGoneThen: 'El gemelo no conocía este punto entonces.',
   cardShow: 'Mostrar en el mapa',
   cardMore: (count) => `${count} más`,
-  cardHistory: (count, from, to) => `Últimas ${count} lecturas, entre ${from} y ${to}`,
   cardSource: 'Origen',
   cardFixed: 'Sensor fijo',
   cardVisited: 'Medido por el robot',
   cardScanned: 'Última lectura',
   cardInspected: 'Flores revisadas',
   cardLastAttempt: 'Último intento',
-  cardAttempts: 'Últimos intentos',
-  cardAttemptKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
   cardArea: 'Zona',
   cardPosition: 'Posición',
 };

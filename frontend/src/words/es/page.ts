@@ -66,11 +66,10 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Un mensaje del servidor no se pudo leer y se descartó.'
       : `${count} mensajes del servidor no se pudieron leer y se descartaron.`,
-  unreadLast: (why) => `Último: ${why}`,
   paused: 'El tiempo está en pausa.',
   pausedHint: 'La simulación o la grabación está en pausa; la antigüedad no aumenta.',
   mixture: 'Más de un gemelo envía datos. La página muestra una mezcla: detenga todos menos uno.',
-  inputProblem: 'No llegan todos los datos.',
+  inputProblem: 'Parte de los datos no llega.',
   drops: (count) =>
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
   journal: {
@@ -115,7 +114,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     recorded: 'Se reproduce una grabación: nada de esto es en directo.',
     sim_time: 'No es la hora real: los datos vienen de una simulación o de una grabación.',
   },
-  recordedIs: { playing: 'En marcha', paused: 'En pausa' },
+  recordedIs: { playing: 'Reproduciendo', paused: 'En pausa' },
   recordedPaused: 'La grabación está en pausa.',
   recordedPausedHint: 'Está en pausa o ha terminado; la antigüedad no aumenta.',
   simulated: 'Simulado.',
@@ -132,9 +131,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   unit: 'Temperatura',
   theme: 'Aspecto',
   themes: { system: 'Sistema', light: 'Claro', dark: 'Oscuro' },
-  copyLink: 'Copiar el enlace a esta vista',
-  linkCopied: 'Enlace copiado',
-  linkInBar: 'La barra de direcciones contiene el enlace a esta vista',
   savePng: 'Guardar el mapa como PNG',
   saveCsv: 'Guardar la tabla como CSV',
   saveCsvShort: 'CSV',
@@ -142,7 +138,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Imprimir',
   kiosk: 'Pantalla mural',
   kioskLeave: 'Salir',
-  cycleNext: (sensor, time) => `después: ${sensor} en ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} se ignora: use de ${least} a ${most} segundos.`,
   help: 'Atajos de teclado',
@@ -184,8 +179,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['C', 'Gráficas del punto elegido'],
       ['L', 'Volver al directo'],
       ['Espacio', 'Reproducir o pausar el histórico'],
-      ['U', '°C o °F'],
-      ['T', 'Claro u oscuro'],
       ['Esc', 'Cerrar; después, volver al directo'],
       ['?', 'Esta lista'],
     ],

@@ -34,7 +34,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStatus: { critical: 'kritiek', healthy: 'binnen de grenzen' },
   alarmBack: 'Weer normaal',
   alarmShow: 'Dit meetpunt nu tonen',
-  alarmStart: 'Naar begin',
+  alarmStart: 'Naar het begin',
   alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
   alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
@@ -121,8 +121,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    heldUntil: (status, isBelow, until) =>
-      until === null ? `nog ${status}` : `${status} tot ${isBelow ? 'onder' : 'boven'} ${until}`,
+    must: {
+      below: (limit) => `moet boven ${limit} komen`,
+      above: (limit) => `moet onder ${limit} komen`,
+    },
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,
@@ -161,7 +163,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       temperature: { below: 'Stoken of luchting sluiten', above: 'Luchten of schermen' },
       co2: { below: 'CO₂ doseren of luchten', above: 'Luchten, CO₂-dosering controleren' },
       light: { below: 'Belichting aanzetten', above: 'Schermen' },
-      soil_moisture: { below: 'Water geven', above: 'Minder water geven, drainage controleren' },
+      soil_moisture: { below: 'Water geven', above: 'Minder water, drain controleren' },
     },
     air: { damp: 'Luchten en stoken', dry: 'Bevochtigen of schermen' },
     range: 'Klimaatregeling controleren',
@@ -176,7 +178,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     other: 'Ter plaatse gaan kijken',
   },
   todoPestAgain: 'Nogmaals controleren',
-  todoWell: 'Opgelost bij de volgende goede meting',
+  todoWell: 'Volgende goede meting afwachten',
   todoAlso: (tags) => (tags === 1 ? 'ook meetpunt' : 'ook meetpunten'),
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
@@ -203,10 +205,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthNoRange: 'Geen meetwaarde met een ideaal bereik',
   healthFilter: ', alleen deze meetpunten tonen',
-  scanInterval: (interval) => `elk meetpunt elke ${interval}`,
+  scanInterval: (interval) => `elk meetpunt om de ${interval}`,
   houseLast: (age) => `laatste meting ${age} geleden`,
   houseNever: 'nog geen meting',
-  houseLate: (age, interval) => `Al ${age} geen meting (normaal elk meetpunt elke ${interval})`,
+  houseLate: (age, interval) => `Al ${age} geen meting (normaal elk meetpunt om de ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'alle meetpunten op tijd'
@@ -221,6 +223,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'te laag' : `${by} te laag`),
   tooHigh: (by) => (by === null ? 'te hoog' : `${by} te hoog`),
   side: { below: 'laag', above: 'hoog' },
-  below: 'onder ideaal',
-  above: 'boven ideaal',
+  below: 'te laag',
+  above: 'te hoog',
 };

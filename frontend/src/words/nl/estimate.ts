@@ -18,10 +18,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   predicted: (inside, scans) =>
     `${whole(inside)} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
   predictedNone: 'Er is nog geen meting mee vergeleken',
-  predictedDay: (inside, scans) =>
-    `Afgelopen dag: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
-  predictedWeek: (inside, scans) =>
-    `afgelopen week: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>
     `Foutmarge te krap: slechts ${count} van de 10 metingen vielen erbinnen, in plaats van 9.`,

@@ -5,9 +5,9 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperatuur', 'Temp.'],
-  ['Luchtvochtigheid', 'RV'],
+  ['Luchtvochtigheid (RV)', 'RV'],
   ['Bodemvocht', 'Bodem'],
-  ['Dampdrukdeficit', 'VPD'],
+  ['Dampdrukdeficit (VPD)', 'VPD'],
 ]);
 
 export const MAP: In<typeof EN.MAP> = {
@@ -47,7 +47,6 @@ export const MAP: In<typeof EN.MAP> = {
   legendError: (error) => `Typische afwijking ${error}`,
   legendErrorHint:
     'Typische afwijking tussen de meetpunten: elk meetpunt wordt uit alle andere geschat en vergeleken met de eigen meetwaarde.',
-  legendErrorWorst: (tag, error) => `Grootste afwijking bij meetpunt ${tag}: ${error}.`,
   legendTransparent: 'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde.',
   legendMore: 'Details',
   legendHatched: 'Gearceerd: geen gegevens',
@@ -69,15 +68,6 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'geen sensor',
   pinFailed: 'sensor uitgevallen',
   pinPest: 'plaag gezien',
-  range: 'Kleurbereik',
-  rangeAuto: 'Auto',
-  rangeFixed: 'Vast',
-  rangeLow: 'Laagste',
-  rangeHigh: 'Hoogste',
-  rangeIdeal: 'Ideaal bereik gebruiken',
-  rangeNotBelow: (high) => `Moet onder ${high} liggen: niet toegepast`,
-  rangeNotAbove: (low) => `Moet boven ${low} liggen: niet toegepast`,
-  rangeNoNumber: 'Geen getal: niet toegepast',
   fieldFailed: (reason) =>
     `De heatmap kon niet worden geladen (${reason}); de pagina blijft het proberen.`,
 
@@ -86,10 +76,8 @@ export const MAP: In<typeof EN.MAP> = {
     none: 'niets',
     day: 'gisteren',
     week: 'een week geleden',
-    own: 'het getoonde moment',
   },
   compareEnd: 'Vergelijking stoppen',
-  compareMoment: 'Het moment om mee te vergelijken',
   difference: (sensor) => `${sensor}: verschil`,
   differenceLoading: 'Het verschil wordt geladen',
   differenceNothing: (at) => `Geen gegevens van ${at}.`,
@@ -165,14 +153,13 @@ export const TAGS: In<typeof EN.TAGS> = {
   unclassified: 'niet herkend',
   tableButton: 'Kolommen en rijen',
   tableColumns: 'Kolommen',
-  columnNoRoom: 'venster te smal',
   tableByArea: 'Groeperen per afdeling',
   areaNone: 'Geen afdeling',
   trend: 'Trend',
   trendTitle: (sensor, hour) =>
     `${sensor} vergeleken met een ${hour ? `kasuur (${hour})` : 'uur'} geleden`,
   trendNone: 'een uur geleden geen meting',
-  trendSame: 'niets nieuws',
+  trendSame: 'geen nieuwe waarde',
   trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: onbekend',
 
@@ -182,15 +169,12 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardGoneThen: 'De digital twin kende dit meetpunt toen niet.',
   cardShow: 'Op de kaart tonen',
   cardMore: (count) => `nog ${count}`,
-  cardHistory: (count, from, to) => `Laatste ${count} meetwaarden, tussen ${from} en ${to}`,
   cardSource: 'Bron',
   cardFixed: 'Vaste sensor',
   cardVisited: 'Bezocht door de robot',
   cardScanned: 'Laatste meetwaarde',
   cardInspected: 'Bloemen gecontroleerd',
   cardLastAttempt: 'Laatste poging',
-  cardAttempts: 'Laatste pogingen',
-  cardAttemptKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
   cardArea: 'Afdeling',
   cardPosition: 'Positie',
 };

@@ -68,11 +68,10 @@ export const PAGE: In<typeof EN.PAGE> = {
     count === 1
       ? 'Een bericht van de server was onleesbaar en is genegeerd.'
       : `${count} berichten van de server waren onleesbaar en zijn genegeerd.`,
-  unreadLast: (why) => `Laatste: ${why}`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of opname is gepauzeerd; de meetwaarden worden niet ouder.',
   mixture: 'Er zendt meer dan één digital twin. De pagina toont een mengsel: stop alle op één na.',
-  inputProblem: 'Niet alle gegevens komen hier aan.',
+  inputProblem: 'Een deel van de gegevens komt niet aan.',
   drops: (count) =>
     `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} niet verwerkt.`,
   journal: {
@@ -134,9 +133,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   unit: 'Temperatuur',
   theme: 'Weergave',
   themes: { system: 'Systeem', light: 'Licht', dark: 'Donker' },
-  copyLink: 'Link naar deze weergave kopiëren',
-  linkCopied: 'Link gekopieerd',
-  linkInBar: 'In de adresbalk staat de link naar deze weergave',
   savePng: 'Kaart opslaan als PNG',
   saveCsv: 'Tabel opslaan als CSV',
   saveCsvShort: 'CSV',
@@ -144,7 +140,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Afdrukken',
   kiosk: 'Wandscherm',
   kioskLeave: 'Verlaten',
-  cycleNext: (sensor, time) => `daarna: ${sensor} over ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} wordt genegeerd: mogelijk is ${least} tot ${most} seconden.`,
   help: 'Sneltoetsen',
@@ -186,8 +181,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['C', 'Grafieken van het gekozen meetpunt'],
       ['L', 'Terug naar live'],
       ['Spatie', 'Terugblik afspelen of pauzeren'],
-      ['U', '°C of °F'],
-      ['T', 'Licht of donker'],
       ['Esc', 'Sluiten, daarna terug naar live'],
       ['?', 'Deze lijst'],
     ],
@@ -255,7 +248,7 @@ export const PAST: In<typeof EN.PAST> = {
     pest: 'gevulde driehoek: plaag gezien',
     cleared: 'lege ring: plaag weg',
     silence: 'gearceerd: geen meetpoging',
-    before: 'tegengesteld gearceerd: niet vastgelegd of niet meer bewaard',
+    before: 'andersom gearceerd: niet vastgelegd of niet meer bewaard',
     run: 'streepjeslijn: klok teruggezet',
   },
   timebarCounts: (scans, failures, seen, cleared) =>

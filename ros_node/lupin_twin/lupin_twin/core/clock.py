@@ -26,8 +26,6 @@ from lupin_twin.core.state import ClockState
 
 # A clock that has not moved for this long, s of steady time, is not running.
 STANDS_AFTER_S: Final = 3.0
-# Maximum age of a twin's report on its clock, s: it comes once a second, or later from a slow twin.
-REPORT_LAG_S: Final = 2.0
 # After standing for this long, s, it is worth subscribing to see whether `/clock` is still sent.
 SUBSCRIBE_AFTER_S: Final = 1.0
 
@@ -68,43 +66,19 @@ class ClockWatch:
         return self.state
 
 
-class StampWatch:
-    """Infers the state of a twin's clock in another process, which receives the twin's states.
+def reported_clock(
+    reported: ClockState | None, stamp_ns: int, *, ages_are_known: bool
+) -> ClockState:
+    """The state of a twin's clock in another process: by the twin's report, if there is one.
 
-    If stamps stand still, the clock may be paused, which only the twin knows. Unless the twin
-    reports that, the clock counts as stopped: a guess never means that all is well.
+    The report comes once a second, so a newer state contradicts it now and then. `ages_are_known`:
+    none of that state's ages is NaN.
     """
-
-    def __init__(self) -> None:
-        self._last_ns: int | None = None
-        self._has_moved = False
-        self._moved_s = 0.0
-
-    def update(
-        self,
-        stamp_ns: int,
-        now_s: float,
-        *,
-        ages_are_known: bool,
-        reported: ClockState | None = None,
-    ) -> ClockState:
-        """Note a state's stamp; `ages_are_known`: none of its ages is NaN.
-
-        `reported` is the twin's last report on its clock, up to `REPORT_LAG_S` older than its
-        state; None if there is none.
-        """
-        if stamp_ns != self._last_ns:
-            self._has_moved = self._last_ns is not None
-            self._last_ns, self._moved_s = stamp_ns, now_s
-        if stamp_ns <= 0:
-            return "none"
-        if not ages_are_known:
-            return "doubted" if reported == "doubted" else "stopped"
-        standing_s = now_s - self._moved_s
-        if reported == "paused" and (standing_s >= STANDS_AFTER_S or not self._has_moved):
-            return "paused"
-        lag_s = REPORT_LAG_S if reported == "running" else 0.0
-        return "running" if standing_s < STANDS_AFTER_S + lag_s else "stopped"
+    if stamp_ns <= 0:
+        return "none"
+    if not ages_are_known:
+        return "doubted" if reported == "doubted" else "stopped"
+    return reported or "running"
 
 
 # Up to this many late observations in a row are not reported.

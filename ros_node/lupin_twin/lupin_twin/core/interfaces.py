@@ -52,7 +52,7 @@ class Topic(Service):
     max_bytes: int = 64_000_000  # the largest that a twin itself accepts, see `message_limits`
 
 
-# Prefix of each layer's topic; the rest is made from the sensor's name, see `layers.topic_of`.
+# Prefix of each layer's topic; the rest is the sensor's name.
 LAYERS_BELOW: Final = "twin/field/"
 
 OBSERVATIONS: Final = Topic(
@@ -146,7 +146,7 @@ GET_HISTORY: Final = Service(
 )
 GET_WRITES: Final = Service(
     "lupin_msgs/srv/GetWrites",
-    "all observations in the order in which they were received, for a follower",
+    "the rows of the log in order of arrival, for a copy of it",
     "twin/get_writes",
 )
 SERVICES: Final = (

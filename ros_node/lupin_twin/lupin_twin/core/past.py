@@ -253,7 +253,6 @@ class PastRow:
     source: str
 
 
-DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
 # A tag's recent writes at a moment: its last scans and inspections, at most this many of each.
 RECENT_COUNT: Final = 9
@@ -267,25 +266,12 @@ class WritesRequest:
 
     From the beginning, writes received more than `reach_s` ago are left out, and all but the latest
     `reach_count`; 0: no limit.
-
-    Raises:
-        PastRefused: a number is out of its range.
-
     """
 
     after: int = 0
     reach_s: float = 0.0
     reach_count: int = 0
-    max_count: int = DEFAULT_WRITES
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be answered."""
-        if self.after > FOREVER_NS:
-            raise PastRefused(f"after is {self.after}, the limit is {FOREVER_NS}")
-        if not 0.0 <= self.reach_s <= 1e9:
-            raise PastRefused(f"reach_s is {self.reach_s}, the limits are 0 and 1e9 s")
-        if not 1 <= self.max_count <= MAX_WRITES:
-            raise PastRefused(f"max_count is {self.max_count}, the limits are 1 and {MAX_WRITES}")
+    max_count: int = MAX_WRITES
 
 
 @dataclass(frozen=True, slots=True)

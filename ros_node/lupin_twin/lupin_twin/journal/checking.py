@@ -8,7 +8,7 @@ checks that rows are valid. SQLite keeps no checksums, so a flipped digit is not
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Final
@@ -57,8 +57,6 @@ _WRONG: Final = {
     ),
 }
 
-Progress = Callable[[str, float], None]
-
 
 def find_damage(path: Path) -> str | None:
     """Return the first defect of the file's structure, None if there is none.
@@ -75,19 +73,17 @@ def find_damage(path: Path) -> str | None:
     return None if found == "ok" else str(found)
 
 
-def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generator[str, None, None]:
+def find_all_damage(connection: sqlite3.Connection) -> Generator[str, None, None]:
     """Yield every defect of a journal, a sentence each.
 
-    `report(what, share)` is called as the work goes on, with the share that is done. A page that
-    cannot be read ends the check of its table, and is reported once.
+    A page that cannot be read ends the check of its table, and is reported once.
 
     Raises:
         sqlite3.OperationalError: the check was interrupted; that is no damage.
 
     """
-    report("structure", 0.0)
     parts = [("structure", _structure(connection))]
-    parts += [(table, _rows(connection, table, report)) for table in _WRONG]
+    parts += [(table, _rows(connection, table)) for table in _WRONG]
     for what, found in parts:
         try:
             yield from found
@@ -113,8 +109,7 @@ def _structure(connection: sqlite3.Connection) -> Iterator[str]:
         yield f"run {number} joins run {joins}, which is missing"
 
 
-def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Iterator[str]:
-    report(table, 0.0)
+def _rows(connection: sqlite3.Connection, table: str) -> Iterator[str]:
     sites = connection.execute(f"SELECT site, min(seq), max(seq) FROM {table} GROUP BY site")
     for site, first, last in sites.fetchall():
         after = first - 1
@@ -127,8 +122,6 @@ def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Itera
                 f"SELECT min(seq) FROM {table} WHERE site = :site AND seq > :until", within
             ).fetchone()
             after = last if following is None else following - 1
-            report(table, (after - first + 1) / (last - first + 1))
-    report(table, 1.0)
 
 
 def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: int) -> None:
@@ -141,7 +134,7 @@ def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: 
 
 # --- what is in it --------------------------------------------------------------------------------
 
-_COUNTED: Final = ("scan", "look", "place", "hour")
+_COUNTED: Final = ("scan", "look", "place")
 
 # A run, and the stamps of its first and last attempts, deleted ones included; None: it has none.
 RunExtent = tuple[Run, int | None, int | None]
@@ -161,21 +154,6 @@ def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
         "SELECT count(*) FROM scan WHERE status != 0 AND is_copy = 0"
     ).fetchone()
     return rows
-
-
-def quarantined_beside(path: Path) -> list[tuple[str, int]]:
-    """(name, bytes) of the damaged journals that were quarantined, the latest last."""
-    prefix = f"{path.name}.damaged-"
-    return [
-        (file.name, size_of(file))
-        for file in sorted(path.parent.iterdir())
-        if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
-    ]
-
-
-def tags_of(connection: sqlite3.Connection) -> list[str]:
-    """The ids of all tags that were observed."""
-    return [tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM series ORDER BY tag")]
 
 
 def sensors_of(connection: sqlite3.Connection) -> list[str]:

@@ -24,7 +24,6 @@ from lupin_twin.journal.retention import (
     Stretches,
     horizon_ns,
     kept,
-    note_limits,
     note_lost,
     purge_step,
     shrink_step,
@@ -353,8 +352,6 @@ class JournalFile:
             if now_s - self._purged_s < PURGE_EVERY_S:
                 return False
             self._purged_s = now_s
-            with self._transaction():
-                note_limits(self._connection, self._limits)
             self._purges_before_ns = horizon_ns(self._connection, self._limits, time.time_ns())
         if self._purges_before_ns is not None:
             with self._transaction():

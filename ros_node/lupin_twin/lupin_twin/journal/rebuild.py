@@ -20,11 +20,10 @@ from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, Appender, copy_known
-from lupin_twin.journal.checking import Progress, find_all_damage, size_of
+from lupin_twin.journal.checking import find_all_damage, size_of
 from lupin_twin.journal.counts import ADD_HOUR, DELETED
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.paths import writing_alone
-from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
 from lupin_twin.journal.runs import Run, put_run, runs
 from lupin_twin.journal.salvage import delete, numbered
 from lupin_twin.journal.schema import (
@@ -56,7 +55,7 @@ _MADE_FROM: Final = "upgraded_from"
 _COPIED: Final = "upgraded"
 # Between two calls while a long SQL statement runs.
 _INSTRUCTIONS: Final = 100_000
-_NUMBERS: Final = (RETENTION_NS, RETENTION_BYTES, "simulated_from_ns", "simulated_until_ns")
+_NUMBERS: Final = ("simulated_from_ns", "simulated_until_ns")
 
 
 def old_version(path: Path) -> int | None:
@@ -286,11 +285,11 @@ class _Upgrade:
                     yield LOCAL_SITE, numbers[key], hour, sensor, *bucket
 
 
-def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
+def vacuum(path: Path, holder: str) -> tuple[int, int]:
     """Vacuum a journal; returns its size in bytes before and after.
 
     The whole file is checked for damage first: vacuuming a damaged file would lose what can still
-    be salvaged. `report(what, share)` is called meanwhile.
+    be salvaged.
 
     Raises:
         InUse: a twin writes it.
@@ -301,7 +300,7 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
     with writing_alone(path, holder) as connection:
         handle_interrupts(connection)
         before = path.stat().st_size
-        with closing(find_all_damage(connection, report)) as found:
+        with closing(find_all_damage(connection)) as found:
             first = next(found, None)
         if first is not None:
             raise NotPossible(

@@ -35,9 +35,6 @@ _PAGES: Final = 128
 # Free pages that stay in the file for new rows: a hundredth of the file, but at least 256.
 _FREE_PAGES: Final = 256
 
-# The limits are in the file, for tools that read it without its twin.
-RETENTION_NS: Final = "kept_ns"
-RETENTION_BYTES: Final = "kept_bytes"
 # Followed by the number of a run: the time up to which some of its rows were lost.
 _LOST: Final = "lost_ns:"
 # At most this many periods are reported: the last ones.
@@ -53,12 +50,6 @@ class Limits:
 
     days: float
     max_bytes: int
-
-
-def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
-    """Write the limits into the file."""
-    set_meta(connection, RETENTION_NS, int(limits.days * DAY_NS))
-    set_meta(connection, RETENTION_BYTES, limits.max_bytes)
 
 
 def used_bytes(connection: sqlite3.Connection) -> int:

@@ -21,14 +21,10 @@ from lupin_msgs.srv import (
 
 from lupin_twin.core.past import (
     DEFAULT_POINTS,
-    DEFAULT_WRITES,
     MAX_POINTS,
-    MAX_WRITES,
     PastRefused,
-    PastWrites,
     SeriesPast,
     SeriesRequest,
-    WritesRequest,
     error_of,
 )
 from lupin_twin.core.state import Snapshot
@@ -126,21 +122,6 @@ _MAX_ROWS: Final = 500_000
 _ID: Final = re.compile("[0-9a-f]{32}")
 
 
-def writes_request(request: Any) -> WritesRequest:
-    """GetWrites.Request as a value."""
-    return WritesRequest(
-        after=int(request.after),
-        reach_s=float(request.reach_s),
-        reach_count=int(request.reach_count),
-        max_count=int(request.max_count) or DEFAULT_WRITES,
-    )
-
-
-def rows_request_message(after: int) -> Any:
-    """A request for the journal's rows after a number."""
-    return GetWrites.Request(after=after, max_count=MAX_WRITES, as_rows=True)
-
-
 def rows_response(lot: Lot) -> Any:
     """Rows as GetWrites.Response."""
     return GetWrites.Response(
@@ -166,40 +147,6 @@ def lot_of(response: Any, after: int) -> Lot:
     if not _ID.fullmatch(lot.journal):
         raise NotALotError(f"{lot.journal[:64]!r} names no journal")
     return lot
-
-
-def writes_response(past: PastWrites) -> Any:
-    """Writes as GetWrites.Response."""
-    texts: dict[str, int] = {}
-
-    def place(text: str) -> int:
-        return texts.setdefault(text, len(texts))
-
-    found = past.writes
-    response = GetWrites.Response(
-        ok=True,
-        journal=past.journal,
-        last=past.last,
-        is_all=past.is_all,
-        span_runs=array("I", (span.run for span in past.spans)),
-        span_starts_ns=array("q", (span.start_ns for span in past.spans)),
-        span_ends_ns=array("q", (span.end_ns for span in past.spans)),
-        numbers=array("Q", (write.number for write in found)),
-        runs=array("I", (write.run for write in found)),
-        tags=array("I", (place(write.tag_id) for write in found)),
-        stamps_ns=array("q", (write.stamp_ns for write in found)),
-        kinds=array("B", (write.kind & 0xFF for write in found)),
-        statuses=array("B", (write.status & 0xFF for write in found)),
-        reading_counts=array("I", (len(write.values) for write in found)),
-        has_seen=[write.has_seen for write in found],
-        species=array("I", (place(write.species) for write in found)),
-        anomalies=[write.anomaly for write in found],
-        bug_counts=array("H", (write.bug_count & 0xFFFF for write in found)),
-        sensors=array("I", (place(name) for write in found for name in write.sensors)),
-        values=array("d", (value for write in found for value in write.values)),
-    )
-    response.texts = list(texts)
-    return response
 
 
 UINT32_MAX: Final = 4_294_967_295

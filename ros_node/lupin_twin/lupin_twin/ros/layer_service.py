@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -20,7 +20,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
-from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS, Topic
+from lupin_twin.core.interfaces import LAYERS, LAYERS_BELOW, PLANTERS, TAGS, Topic
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
 from lupin_twin.field.engine import (
@@ -41,7 +41,6 @@ from lupin_twin.ros.layers import (
     points,
     tag_markers,
     tag_marks,
-    topics_of,
 )
 from lupin_twin.ros.parameters import naming
 from lupin_twin.ros.services import Services, Twin
@@ -87,20 +86,19 @@ class LayerService:
         self._twin, self._services = twin, services
         self._workers = Workers("layers", large_threads=1, small_threads=0)
         self._topics: list[_Topic] = []
-        self._whole: tuple[object, FieldRequest] | None = None
         self.queue = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
 
     def offer(self) -> None:
         """Create the topics, with names relative to the node's namespace.
 
         Raises:
-            ParameterError: a sensor gives no valid topic, or two give the same.
+            ParameterError: a sensor's name is no valid name of a topic.
 
         """
         of = self._twin.parameters
-        for name, sensor in topics_of(of.layers).items():
+        for sensor in dict.fromkeys(of.layers):
             with naming("layers", sensor):
-                publisher = self._publisher(PointCloud2, name, LAYERS)
+                publisher = self._publisher(PointCloud2, LAYERS_BELOW + sensor, LAYERS)
             self._topics.append(_Topic(publisher, sensor))
         for topic, marks, make in (
             (TAGS, tag_marks, tag_markers),
@@ -203,13 +201,9 @@ class LayerService:
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The request for a sensor's field; its box, that of all tags, is the same for all."""
         rules = self._twin.rules
-        key = self._twin.store.observation_count, rules
-        if self._whole is None or self._whole[0] != key:
-            places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
-            box = default_box(places, rules.max_distance_m)
-            most = min(rules.max_grid_cells, MAX_POINTS)
-            self._whole = key, default_request(sensor, box, most)
-        return replace(self._whole[1], sensor_type=sensor)
+        places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
+        box = default_box(places, rules.max_distance_m)
+        return default_request(sensor, box, min(rules.max_grid_cells, MAX_POINTS))
 
     def _plan_markers(self, topic: _Topic) -> Query:
         # Markers show ages: whether they have changed is known only when they are made.

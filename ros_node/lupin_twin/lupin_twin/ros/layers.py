@@ -8,10 +8,9 @@ latest transform: they are latched, and may be shown long after.
 from __future__ import annotations
 
 import math
-import re
 import sys
 from array import array
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
@@ -23,8 +22,6 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from lupin_twin.core.interfaces import LAYERS_BELOW
-from lupin_twin.core.parameters import ParameterError
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
 from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.grid import FieldGrid, cell_centres
@@ -100,38 +97,6 @@ COLUMNS: Final = ("x", "y", "z", "value", "error")
 ERROR_UNKNOWN: Final = -1.0
 
 PointArray = npt.NDArray[np.float32]
-
-
-def topic_of(sensor: str) -> str:
-    """The relative topic of a sensor's layer; characters that ROS forbids are written in hex.
-
-    `soil moisture` is `soil_x20_moisture`. A token that does not begin with a letter gets the
-    prefix `sensor_`. ROS allows no digit there, and hides names that begin with an underscore. Two
-    sensors may give the same name: see `topics_of`.
-    """
-    token = re.sub(r"[^A-Za-z0-9_]", lambda other: f"_x{ord(other.group()):x}_", sensor)
-    if not re.match(r"[A-Za-z]", token):
-        token = f"sensor_{token}"
-    return LAYERS_BELOW + token
-
-
-def topics_of(sensors: Iterable[str]) -> dict[str, str]:
-    """The sensors by their topics.
-
-    Raises:
-        ParameterError: two of them give the same topic.
-
-    """
-    named: dict[str, str] = {}
-    for sensor in sensors:
-        topic = topic_of(sensor)
-        if topic in named:
-            raise ParameterError(
-                f"parameter layers has {named[topic]!r} and {sensor!r}, expected sensors of which "
-                f"each has a topic of its own: both have {topic}"
-            )
-        named[topic] = sensor
-    return named
 
 
 def points(grid: FieldGrid, estimate: EstimateGrid | None) -> PointArray:
@@ -251,7 +216,7 @@ def _marker(
 
 
 class MarkerArrays:
-    """Builds visualization_msgs/MarkerArray of one kind of marks, and caches each one's markers.
+    """Builds visualization_msgs/MarkerArray of one kind of marks, when they have changed.
 
     An array is complete: its first marker deletes all earlier ones, so that nothing outdated stays
     in a viewer, not even from an earlier twin. Belongs to one thread at a time.
@@ -267,17 +232,16 @@ class MarkerArrays:
         self._marks = marks
         self._make = make
         self._frame_id = frame_id
-        self._markers: dict[Hashable, list[Any]] | None = None
-        self._clear = Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)
+        self._before: Sequence[Any] | None = None
 
     def build(self, snapshot: Snapshot) -> bytes | None:
         """The serialised array, or None if it has not changed; lets other threads run meanwhile."""
-        marks, before = self._marks(snapshot), self._markers
-        if before is not None and marks == [*before]:
+        marks = self._marks(snapshot)
+        if marks == self._before:
             return None
-        self._markers = {}
+        self._before = marks
+        header = Header(frame_id=self._frame_id)
+        markers = [Marker(header=header, action=Marker.DELETEALL)]
         for mark in in_turns(marks):
-            known = None if before is None else before.get(mark)
-            self._markers[mark] = known or self._make(mark, self._frame_id)
-        markers = [self._clear, *chain.from_iterable(self._markers.values())]
+            markers += self._make(mark, self._frame_id)
         return bytes(serialize_message(MarkerArray(markers=markers)))

@@ -38,7 +38,14 @@ from lupin_twin.core.interfaces import (
     GET_WRITES,
 )
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.past import EVERY_TAG, NotRemembered, PastRefused, check_moment, message_of
+from lupin_twin.core.past import (
+    EVERY_TAG,
+    FOREVER_NS,
+    NotRemembered,
+    PastRefused,
+    check_moment,
+    message_of,
+)
 from lupin_twin.core.state import Snapshot, TwinStore
 from lupin_twin.estimate import engine
 from lupin_twin.estimate.engine import Estimate, EstimateRequest, TagPast, moment_of
@@ -56,7 +63,7 @@ from lupin_twin.field.idw import never
 from lupin_twin.journal import follow
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG, SERIES_S, SERIES_S_PER_TAG, series
-from lupin_twin.journal.writes import WRITES_S, writes
+from lupin_twin.journal.writes import WRITES_S
 from lupin_twin.ros import convert, convert_services
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.parameters import naming
@@ -229,14 +236,9 @@ class Services:
         )
 
     def _writes(self, request: Any, reply: Reply) -> Query:
-        query = convert_services.writes_request(request)
-        if request.as_rows:
-            search = self._search(
-                lambda log: follow.read(log, query.after, query.max_count), WRITES_S
-            )
-            return Query(search, reply, convert_services.rows_response, MESSAGE_S)
-        search = self._search(lambda log: writes(log, query), WRITES_S)
-        return Query(search, reply, convert_services.writes_response, MESSAGE_S)
+        after = min(int(request.after), FOREVER_NS)
+        search = self._search(lambda log: follow.read(log, after), WRITES_S)
+        return Query(search, reply, convert_services.rows_response, MESSAGE_S)
 
     def _search(
         self, search: Callable[[sqlite3.Connection], Any], cost_s: float

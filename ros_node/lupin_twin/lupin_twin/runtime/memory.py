@@ -15,7 +15,6 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -193,7 +192,7 @@ class Memory:
             if doubt is not None and self._doubt is None:
                 self._hand_over(entry.write)
         self.clamp_to(now)
-        return f"journal {self.condition.path}: {_summary(restored, now)}"
+        return f"journal {self.condition.path}: restored {len(restored.known.tags):,} tags"
 
     def _restore(self, restored: Restored) -> None:
         count = self._store.observation_count
@@ -262,27 +261,3 @@ def _moved(early: _Early, by_ns: int) -> _Early:
         was_right = write.stamp_ns < own_ns <= stamp_ns
         write = replace(write, stamp_ns=own_ns if was_right else stamp_ns)
     return early._replace(write=write)
-
-
-def _summary(restored: Restored, now: Clock) -> str:
-    tags = restored.known.tags
-    if not tags:
-        return "nothing to restore"
-    counts = {
-        "positions": sum(tag.pose is not None for tag in tags),
-        "readings": sum(len(tag.readings) for tag in tags),
-        "inspections": sum(tag.looked_at_ns is not None for tag in tags),
-    }
-    what = ", ".join(f"{count:,} {name}" for name, count in counts.items())
-    times = [r.observed_at_ns for tag in tags for r in tag.readings if r.observed_at_ns is not None]
-    times += [tag.last_observed_ns for tag in tags if tag.last_observed_ns is not None]
-    oldest = f"; the oldest observation is from {_moment(min(times), now)}" if times else ""
-    return f"restored {len(tags):,} tags with {what}{oldest}"
-
-
-def _moment(stamp_ns: int, now: Clock) -> str:
-    try:
-        moment = datetime.fromtimestamp(stamp_ns / 1e9, UTC)
-    except (OverflowError, ValueError):
-        return f"second {stamp_ns // 10**9}"
-    return f"second {stamp_ns / 1e9:.3f}" if now.is_simulated else f"{moment:%Y-%m-%dT%H:%M:%SZ}"

@@ -30,8 +30,6 @@ from typing import Final, NoReturn, TextIO
 IDLE_WORKERS_END_S: Final = 0.1
 # Exit code of a command that Ctrl-C has ended, as in a shell: 128 and the signal's number.
 INTERRUPTED: Final = 130
-# Exit code of Python if the last of the standard output could not be written.
-NOT_WRITTEN: Final = 120
 # Exit code for invalid arguments.
 USAGE_ERROR: Final = 2
 
@@ -43,7 +41,6 @@ def exit_after(main: Callable[[], int]) -> NoReturn:
     the process quietly, also during slow imports, before `main` waits for it.
     """
     try:
-        open_standard_files()
         code = main()
     except KeyboardInterrupt:
         code = INTERRUPTED
@@ -80,23 +77,6 @@ def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, ros
 
 
-def open_standard_files() -> None:
-    """Open /dev/null for each standard stream that the parent process has closed.
-
-    Otherwise the next file that is opened would get its number, and a C library would print into
-    that file. Python has None for such a stream, and `sys.stderr.write` would raise.
-    """
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            # `open` takes the lowest free number, which is this one. Children inherit it too.
-            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: PTH123, SIM115
-
-
 def exit_process(code: int) -> NoReturn:
     """End the process, whatever its other threads are computing.
 
@@ -110,29 +90,11 @@ def exit_process(code: int) -> NoReturn:
         thread.join(max(0.0, deadline_s - time.monotonic()))
     if any(thread.is_alive() for thread in others):
         logging.shutdown()
-        os._exit(_flushed(code))
-    sys.exit(_flushed(code))
-
-
-def _flushed(code: int) -> int:
-    """Flush the standard output and error; returns the exit code.
-
-    If the standard output fails, that is reported. If the standard error does, that is no failure
-    of the command. Python would treat it as one, so its text is discarded.
-    """
-    try:
-        sys.stdout.flush()
-    except OSError as error:
-        discard_output(sys.stdout)
-        if code == 0:
-            code = NOT_WRITTEN
+        for stream in (sys.stdout, sys.stderr):
             with suppress(OSError):
-                sys.stderr.write(f"cannot write to the standard output: {error.strerror}\n")
-    try:
-        sys.stderr.flush()
-    except OSError:
-        discard_output(sys.stderr)
-    return code
+                stream.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def discard_output(stream: TextIO) -> None:

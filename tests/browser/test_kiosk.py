@@ -59,7 +59,7 @@ def test_a_wall_screen_rotates_and_the_named_key_leaves_it(
     wall = open_page(greenhouse.url, "sensor=temperature", "?kiosk=1&cycle=5")
     note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
     # Too low for the whole list: it shows how many tags are left, and cuts none in two.
-    wall.resize(1100, 500)
+    wall.resize(1100, 440)
     row, since = places(wall, ".attention > ul > li", ".attention-do small:not(:empty)")
     assert since.right == row.right
 

@@ -261,8 +261,7 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     hmi.go()
     hmi.expect_map()
     running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
-    slim = partial(is_slim, hmi, 0.8 * narrow)
-    hmi.expect(slim, "a map as wide as the greenhouse")
+    hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")
 
 
 def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(
@@ -306,10 +305,6 @@ def test_the_table_stays_in_place_while_tags_arrive(running: Bridge, open_page: 
         expect(hmi.row(ids[-1])).to_be_attached()
         assert table.evaluate("table => table.scrollTop") == 0
     expect(hmi.row("20")).to_be_in_viewport()
-
-
-def is_slim(hmi: Hmi, most: float) -> bool:
-    return place(hmi.page.locator(".map-panel")).right < most
 
 
 def stands_at(hmi: Hmi, filter_bar: list[Box]) -> bool:

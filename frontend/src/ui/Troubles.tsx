@@ -141,7 +141,10 @@ export function Troubles(): JSX.Element {
 
 /** Why the bridge calls the twin offline, in words for an operator. */
 export function offlineReason(status: StatusFrame | null): string {
-  return textFor(S.offlineWhy, status?.reason) ?? S.frozenWhy.offline;
+  // A fleet doubts a clock that is ahead of the archive's; its journal goes on.
+  const isAhead = status?.reason === 'clock_doubted' && status.journal.state !== 'doubting';
+  const reason = isAhead ? 'clock_ahead' : status?.reason;
+  return textFor(S.offlineWhy, reason) ?? S.frozenWhy.offline;
 }
 
 /** The same for whoever maintains the system; empty: nothing to add. */

@@ -50,6 +50,7 @@ export const PAGE = {
       'The twin’s time comes from there, and it has stopped. The age of the readings is unknown.',
     clock_doubted:
       'It is behind the recorded data. Until it is right, or for ten minutes, ages are unknown and recording waits.',
+    clock_ahead: 'It is ahead of the archive’s clock, so ages are unknown.',
     never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
     stale: 'The twin has stopped sending. Check that it is running.',
     thread_dead: 'The server has lost the twin and must be restarted.',

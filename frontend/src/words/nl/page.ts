@@ -47,6 +47,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       'Daar haalt de digital twin zijn tijd vandaan; die staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_doubted:
       'Die loopt achter op de vastgelegde gegevens. Tot de klok goed staat, hooguit tien minuten, is onbekend hoe oud de meetwaarden zijn en wacht het vastleggen.',
+    clock_ahead: 'Die loopt voor op het archief; hoe oud de meetwaarden zijn, is onbekend.',
     never_seen:
       'De server heeft nog niets van een digital twin ontvangen. Staat de digital twin aan?',
     stale: 'De digital twin stuurt niets meer. Controleer of hij draait.',

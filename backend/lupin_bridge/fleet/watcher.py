@@ -268,9 +268,7 @@ class Watcher:
         alarms = _alarms(site, judged, moment_ns)
         is_ahead = newest_ns - now_ns > MAX_AHEAD_NS
         judgement = judged.judge.see(
-            replace(
-                judged.snapshot, stamp_ns=moment_ns, clock="doubted" if is_ahead else "running"
-            )
+            replace(judged.snapshot, stamp_ns=moment_ns, clock="doubted" if is_ahead else "running")
         )
         if judged.alarms.is_caught_up:
             said = notes_of_alarms(alarms, judged.notes, now_ns)
@@ -293,7 +291,7 @@ class Watcher:
             site = replace(
                 site,
                 active_alarms=len(calling),
-                causes=causes(calling),
+                causes=causes(entry for _, entry in calling),
                 alarms=tuple(entry for _, entry in active[:MAX_ALARMS]),
             )
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live

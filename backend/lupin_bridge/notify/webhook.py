@@ -27,9 +27,10 @@ import orjson
 from lupin_bridge.alarms.board import Change, happened_ns
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.verdict import ORDER
 from lupin_bridge.notify.destinations import Endpoint, WebhookTarget
 from lupin_bridge.notify.messages import Backoff, Condition, Source
-from lupin_bridge.stream.state_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json, cause_of
 
 log = logging.getLogger(__name__)
 
@@ -43,11 +44,15 @@ What = Literal["raised", "worse", "cleared", "withdrawn"]
 
 
 class Delivery(NamedTuple):
-    """One change of one alarm; `id` is the same however often it is sent."""
+    """One change of one alarm; `id` is the same however often it is sent.
+
+    `also` are the other alarms of its cause, tag and moment, which are not worse.
+    """
 
     id: str
     change: What
     alarm: Alarm
+    also: tuple[Alarm, ...] = ()
 
 
 class AlarmNews:
@@ -60,6 +65,19 @@ class AlarmNews:
 
     def of(self, change: Change, now_ns: int | None) -> Iterator[Delivery]:
         """Yield the deliveries of a change; `now_ns` is ROS time; None: not known."""
+        # Damp air, say, is one message, whatever sensors tell of it.
+        together: dict[tuple[object, ...], list[Delivery]] = {}
+        for it in self._each(change, now_ns):
+            _, what, alarm, _ = it
+            at_ns = alarm.worse_at_ns if what == "worse" else happened_ns(alarm)
+            key = what, alarm.tag_id, at_ns, cause_of(alarm_json(alarm))
+            together.setdefault(key, []).append(it)
+        for found in together.values():
+            # By what a restart does not change: the same id again.
+            first, *also = sorted(found, key=_worst_then)
+            yield first._replace(also=tuple(it.alarm for it in also))
+
+    def _each(self, change: Change, now_ns: int | None) -> Iterator[Delivery]:
         changed: Iterable[Alarm] = change.changed
         if change.is_past:
             newest_ns = max(map(happened_ns, changed), default=0)
@@ -93,6 +111,13 @@ class AlarmNews:
             yield Delivery(f"{alarm.id}.raised", "raised", alarm)
         if alarm.is_worse and not was_worse:
             yield Delivery(f"{alarm.id}.worse.{alarm.reason.verdict}", "worse", alarm)
+
+
+def _worst_then(delivery: Delivery) -> tuple[int, str]:
+    alarm = delivery.alarm
+    is_raised = delivery.change == "raised"
+    verdict = alarm.raised_as if is_raised and alarm.raised_as else alarm.reason.verdict
+    return ORDER[verdict], alarm.id
 
 
 def signed(secret: bytes, delivery_id: str, now_s: int, body: bytes) -> dict[str, str]:
@@ -169,8 +194,9 @@ class Webhook:
     async def _run(self) -> None:
         guard = Guard("the webhook had an error and continues")
         while True:
-            name, change, alarm = await self._waiting.get()
-            of = {"change": change, "alarm": alarm_json(alarm)}
+            name, change, alarm, also = await self._waiting.get()
+            alarms = {**alarm_json(alarm), "also": [alarm_json(it) for it in also]}
+            of = {"change": change, "alarm": alarms}
             error = await guard.run(self._send(name, of))
             if isinstance(error, Exception):
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")

@@ -7,13 +7,13 @@ the sensors file.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
 from functools import cache, partial
 from html import escape
 from importlib.resources import files
+from operator import itemgetter
 from typing import Any, Final
 
 import orjson
@@ -24,7 +24,7 @@ from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.past.report import Report
 from lupin_bridge.serving.admission import content_answer
-from lupin_bridge.stream.state_json import stamp
+from lupin_bridge.stream.state_json import by_cause, cause_of, stamp
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, TagState
 
@@ -37,10 +37,8 @@ PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Decimal comma and thousands point, in all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 _EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
-# More active alarms than this that share a cause are below one heading, as on the page.
+# More tags than this that share a cause and an area are below one heading, as on the page.
 MOST_LOOSE: Final = 4
-# Alarms in one notification.
-MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
 # An entry of a list in the body.
 Entry = Mapping[str, Any]
@@ -62,20 +60,6 @@ def languages() -> Collection[str]:
     return _words().keys()
 
 
-def push_text(
-    alarms: Sequence[Entry], lang: str, criteria: Criteria, origin: Origin
-) -> tuple[str, str]:
-    """Title and text of a notification of alarms, each as in `/api/alarms`."""
-    page = _Page(lang, criteria)
-    title = page.say("alarm") if len(alarms) == 1 else f"{page.say('alarms')}: {len(alarms)}"
-    lines = [page.alarm(alarm) for alarm in alarms[:MAX_PUSHED]]
-    if len(alarms) > MAX_PUSHED:
-        lines.append(page.say("more", count=len(alarms) - MAX_PUSHED))
-    of = _words()[lang]["origins"].get(origin, "")
-    # A tag's name may be long, a push service takes 4 kB.
-    return f"{of}: {title}" if of else title, "\n".join(line[:200] for line in lines)
-
-
 @dataclass(frozen=True, slots=True)
 class ReportPage(Report):
     """The report as a page in the language `lang`; times are in `zone`; None: the greenhouse's.
@@ -92,7 +76,7 @@ class ReportPage(Report):
 
     def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:
         """See `Report`."""
-        words = _Page(self.lang, self.criteria, self.zone, tags)
+        words = PageText(self.lang, self.criteria, self.zone, tags)
         page = words.page(body, self.origin, self.site, self.unknown_zone)
         headers = {**self._headers(), **PAGE_HEADERS}
         return of_content(content_answer(page.encode("utf-8", "replace"), HTML_TYPE, headers))
@@ -118,7 +102,9 @@ def _head(lang: str, title: str, period: str = "") -> str:
     )
 
 
-class _Page:
+class PageText:
+    """The texts of a report in a language; `words` are those of `report_words.json`."""
+
     def __init__(
         self,
         lang: str,
@@ -129,20 +115,21 @@ class _Page:
         self._lang = lang
         self._tags = {tag.tag_id: tag for tag in tags}
         self._zone = zone or criteria.clock.zone
-        self._words = _words()[lang]
+        self.words = _words()[lang]
         self._criteria = criteria
         self._day = ""
         named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
     def page(self, body: Entry, origin: Origin, site: str, unknown_zone: str) -> str:
+        """The whole page, of the body of a report."""
         say, at = self.say, self._at
         # Rows omit the date of the first day.
         day, comma, _ = at(body["from"]).rpartition(", ")
         self._day = f"{day}{comma}"
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
         heading = f"{say('title')}: {site}" if site else say("title")
-        hint = self._words["hints"].get(origin)
+        hint = self.words["hints"].get(origin)
         known = [
             say(word, at=at(body[name]))
             for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
@@ -202,20 +189,27 @@ class _Page:
         )
 
     def _of_alarms(self, title: str, alarms: Sequence[Entry], columns: Sequence[str]) -> str:
+        """A row for each cause at a tag, below a heading if many of an area share it."""
         names = ("alarm", "point", *columns)
         if any(self._who(alarm) for alarm in alarms):
             names = (*names, "who")
+        rows: dict[tuple[str, str], list[Entry]] = {}
+        for entry in by_cause(alarms):
+            rows.setdefault(
+                (cause_of(entry), self._criteria.sensors.area_of(entry["tag_id"])), []
+            ).append(entry)
+        groups: dict[str, list[Entry]] = {"": []}
+        for (_, area), own in rows.items():
+            cause = " · ".join(filter(None, (area, self._cause(own))))
+            heading = f"{cause}: {self._count(len(own))}" if len(own) > MOST_LOOSE else ""
+            groups.setdefault(heading, []).extend(own)
 
-        def cells(alarm: Entry) -> Iterable[str]:
-            found = self._alarm(alarm)
+        def cells(entry: Entry) -> Iterable[str]:
+            found = self._alarm(entry)
+            # A heading has the cause of its rows.
+            found["alarm"] = found["times"] if entry not in groups[""] else found["alarm"]
             return [found[name.removesuffix("*")] for name in names]
 
-        is_active = title == "active_alarms"
-        counts = Counter(self._what(alarm["reason"]) for alarm in alarms if is_active)
-        groups: dict[str, list[Entry]] = {}
-        for alarm in alarms:
-            cause = self._what(alarm["reason"])
-            groups.setdefault(cause if counts[cause] > MOST_LOOSE else "", []).append(alarm)
         return self._list(title, "alarms", groups, names, cells)
 
     def _who(self, alarm: Entry) -> str:
@@ -226,31 +220,38 @@ class _Page:
             if f"{word}_by" in alarm
         )
 
-    def _alarm(self, alarm: Entry) -> Mapping[str, str]:
-        """The cells of an alarm, by their columns; its status is that of its worst value."""
-        reason, tag = alarm["reason"], self._tags.get(alarm["tag_id"])
-        raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
-        numbers, verdict = reason["kind"] == "range", self._words["verdicts"][reason["verdict"]]
-        number, at_end = partial(self._number, sensor=reason["sensor"]), ""
-        worst = number(alarm["worst"], limit=limit)
+    def _alarm(self, entry: Entry) -> dict[str, str]:
+        """The cells of a row, by their columns; of damp or dry air, the values are one sensor's."""
+        reason, tag, own = entry["reason"], self._tags.get(entry["tag_id"]), [entry, *entry["also"]]
+        sensor, limit = reason["sensor"], reason["limit"]
+        numbers, verdict = reason["kind"] == "range", self.words["verdicts"][reason["verdict"]]
+        number, at_end = partial(self._number, sensor=sensor, limit=limit), ""
+        mine = [it for it in own if it["reason"]["sensor"] == sensor]
+        values = [it["worst"] for it in mine if it["worst"] is not None]
+        worst = number(max(values, key=lambda it: abs(it - (limit or 0.0)), default=None))
         if tag is not None:
             pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
-            name = reason["sensor"] if numbers else reason["kind"]
             for it in (*tag.readings, *derive(tag.readings)) if numbers else (pests,):
-                if it.name == name:
-                    at_end = number(it.value, limit=limit)
+                if it.name == (sensor if numbers else reason["kind"]):
+                    at_end = number(it.value)
                     if at_end and it.observed_at_ns is not None:
                         at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
+        over = [
+            (it["raised_at"]["sec"], it["cleared_at"]["sec"]) for it in mine if it["cleared_at"]
+        ]
+        cause, times = self._cause([entry]), f"{len(mine)}×" if len(mine) > 1 else ""
+        worst = f"{worst} ({verdict})" if worst else verdict
         return {
-            "alarm": self._what(reason),
-            "point": alarm["tag_id"] or self.say("house"),
-            "when": self._clock(raised),
-            "end": "" if cleared is None else self._clock(cleared),
-            "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
+            "times": times,
+            "alarm": f"{cause} {times}".strip(),
+            "point": entry["tag_id"] or self.say("house"),
+            "when": self._clock(min((it["raised_at"] for it in own), key=itemgetter("sec"))),
+            "end": self._clock({"sec": max(to_s for _, to_s in over)}) if over else "",
+            "length": self._length(sum(to_s - from_s for from_s, to_s in over)) if over else "",
             "at_end": at_end,
-            "worst": f"{worst} ({verdict})" if worst else verdict,
+            "worst": worst if cause == self._what(reason) else f"{self._label(sensor)} {worst}",
             "limits": self._limits(reason, tag) if numbers else "",
-            "who": self._who(alarm),
+            "who": "; ".join(dict.fromkeys(filter(None, map(self._who, own)))),
         }
 
     def _limits(self, reason: Entry, tag: TagState | None) -> str:
@@ -258,20 +259,16 @@ class _Page:
 
         Only that limit, if no range of today has it. A range is written as on the page.
         """
-        sensor = self._criteria.sensors.named(reason["sensor"])
+        sensor, species = self._criteria.sensors.named(reason["sensor"]), tag and tag.flower.species
         number = partial(self._number, sensor=reason["sensor"])
         is_critical = reason["verdict"] == "critical"
-        for species in ("" if tag is None else tag.flower.species, ""):
-            for is_day in (True, False):
-                ranges = sensor.ranges(is_day=is_day, species=species)
-                for span in (ranges.ideal, ranges.critical):
-                    if span is not None and reason["limit"] in {span.low, span.high}:
-                        whole = ranges.critical or span if is_critical else span
-                        low = number(whole.low).removesuffix(f"\u00a0{sensor.unit}")
-                        # No-break spaces keep it on one line.
-                        text = self.say("period", **{"from": low, "to": number(whole.high)})
-                        return text.replace(" ", "\u00a0")
-        return number(reason["limit"])
+        span = sensor.passed(reason["limit"], species or "", is_critical=is_critical)
+        if span is None:
+            return number(reason["limit"])
+        low = number(span.low).removesuffix(f"\u00a0{sensor.unit}")
+        # No-break spaces keep it on one line.
+        text = self.say("period", **{"from": low, "to": number(span.high)})
+        return text.replace(" ", "\u00a0")
 
     def _sensor(self, of: Entry) -> Iterable[str]:
         number = partial(self._number, sensor=of["sensor_type"])
@@ -302,7 +299,7 @@ class _Page:
                 about = f"{self._what(alarm['reason'])}, {self._where(alarm['tag_id'])}"
             else:
                 about = self.say("alarm") if kind == "alarm" else self._where(name)
-            said = self._words["kinds"].get(note["kind"], note["kind"]), note["text"]
+            said = self.words["kinds"].get(note["kind"], note["kind"]), note["text"]
             text = ": ".join(it for it in said if it)
             text += f" ({self.say('withdrawn', name=gone)})" if gone else ""
             return self._clock(note["made_at"]), note["by"], text, about
@@ -345,8 +342,7 @@ class _Page:
         rows = ""
         for heading, entries in groups.items():
             if heading:
-                text = f"{heading}: {self._count(len(entries))}"
-                rows += f'<tr><th colspan="{len(columns)}">{escape(text)}</th></tr>'
+                rows += f'<tr><th colspan="{len(columns)}">{escape(heading)}</th></tr>'
             for entry in entries:
                 is_critical = entry.get("reason", {}).get("verdict") == "critical"
                 rows += '<tr class="critical">' if is_critical else "<tr>"
@@ -365,17 +361,23 @@ class _Page:
 
     # --- words ------------------------------------------------------------------------------------
 
-    def alarm(self, alarm: Entry) -> str:
-        """An alarm on one line."""
-        reason = alarm["reason"]
-        verdict = self._words["verdicts"][reason["verdict"]]
-        return f"{self._where(alarm['tag_id'])}: {self._what(reason)} ({verdict})"
+    def alarm(self, entry: Entry) -> str:
+        """A cause at a tag on one line."""
+        verdict = self.words["verdicts"][entry["reason"]["verdict"]]
+        return f"{self._where(entry['tag_id'])}: {self._cause([entry])} ({verdict})"
 
     def say(self, word: str, **filled: object) -> str:
-        text: str = self._words[word]
+        """A text, its places filled."""
+        text: str = self.words[word]
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", str(value))
         return text
+
+    def _cause(self, rows: Sequence[Entry]) -> str:
+        """What is wrong; damp or dry air, if several sensors tell of it."""
+        sensors = {it["reason"]["sensor"] for row in rows for it in (row, *row["also"])}
+        air: Words = self.words["air"]
+        return self._what(rows[0]["reason"]) if len(sensors) == 1 else air[cause_of(rows[0])]
 
     def _what(self, reason: Entry) -> str:
         kind, sensor, value, limit = (reason[it] for it in ("kind", "sensor", "value", "limit"))
@@ -383,7 +385,7 @@ class _Page:
             kind = "low" if value < limit else "high"
         elif kind == "old" and sensor:
             kind = "old_sensor"
-        text: str = self._words["reasons"].get(kind, kind)
+        text: str = self.words["reasons"].get(kind, kind)
         return text.replace("{sensor}", self._label(sensor))
 
     def _label(self, sensor: str) -> str:
@@ -399,7 +401,7 @@ class _Page:
         if wall_s is None:
             return f"sim {sec // 3600:02}:{sec // 60 % 60:02}"
         at = datetime.fromtimestamp(wall_s, self._zone)
-        month = self._words["months"][at.month - 1]
+        month = self.words["months"][at.month - 1]
         return self.say("date", day=at.day, month=month, year=at.year, clock=f"{at:%H:%M}")
 
     def _clock(self, when: Mapping[str, int]) -> str:

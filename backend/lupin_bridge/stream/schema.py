@@ -330,7 +330,8 @@ class StatusFrame(Contract):
     reason: Reason = Field(
         description="paused: simulated time is paused, and the twin is live; no_clock, "
         "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal, "
-        "or is ahead of the archive's clock. In the last three, no age is known, and the twin counts as offline"
+        "or is ahead of the archive's. In the last three, no age is known, and the twin counts "
+        "as offline"
     )
     message: str = Field(description="for a person to read")
     state_age_seconds: float | None = Field(

@@ -141,6 +141,8 @@ export function Troubles(): JSX.Element {
 
 /** Why the bridge calls the twin offline, in words for an operator. */
 export function offlineReason(status: StatusFrame | null): string {
+  const problem = sourceProblem(status);
+  if (problem !== null) return problem;
   // A fleet doubts a clock that is ahead of the archive's; its journal goes on.
   const isAhead = status?.reason === 'clock_doubted' && status.journal.state !== 'doubting';
   const reason = isAhead ? 'clock_ahead' : status?.reason;
@@ -151,7 +153,15 @@ export function offlineReason(status: StatusFrame | null): string {
 export const offlineMore = (status: StatusFrame | null): string =>
   status?.reason === 'clock_doubted'
     ? sentence(status.journal.detail, MAX_PROBLEM)
-    : (textFor(S.offlineMore, status?.reason) ?? '');
+    : sourceProblem(status) === null
+      ? (textFor(S.offlineMore, status?.reason) ?? '')
+      : '';
+
+/** Why the server has received nothing, such as an archive that is down; null: not reported. */
+const sourceProblem = (status: StatusFrame | null): string | null => {
+  const [problem] = status?.reason === 'never_seen' ? status.input_problems : [];
+  return problem === undefined ? null : sentence(problem, MAX_PROBLEM);
+};
 
 /** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {

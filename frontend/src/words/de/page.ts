@@ -160,7 +160,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyUnreachableHint: 'Bitte prüfen, ob er eingeschaltet ist. Die Seite versucht es weiter.',
   emptyUnreachableMore:
     'Der Server ist die Bridge: „lupin-twin serve“ auf dem Roboter oder „make run“ für die Demo.',
-  emptyNoTwin: 'Noch kein Zwilling',
+  emptyNoTwin: 'Noch keine Daten',
   emptyNoTags: 'Noch keine Messpunkte',
   emptyNoTagsHint:
     'Messpunkte erscheinen, sobald der Roboter sie findet oder misst: ' +

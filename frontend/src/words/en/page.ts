@@ -163,7 +163,7 @@ export const PAGE = {
   emptyUnreachableHint: 'Check that it is switched on. The page keeps trying.',
   emptyUnreachableMore:
     'The server is the bridge: “lupin-twin serve” on the robot, or “make run” for the demo.',
-  emptyNoTwin: 'No twin yet',
+  emptyNoTwin: 'No data yet',
   emptyNoTags: 'No tags yet',
   emptyNoTagsHint: 'Tags appear when the robot finds or scans them: start its patrol.',
   emptyNoTagsMore: '“lupin-twin demo” shows a simulated patrol.',

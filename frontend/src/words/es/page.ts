@@ -158,7 +158,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyUnreachableHint: 'Compruebe que está encendido. La página lo sigue intentando.',
   emptyUnreachableMore:
     'El servidor es el puente («bridge»): «lupin-twin serve» en el robot, o «make run» para la demostración.',
-  emptyNoTwin: 'Aún no hay gemelo',
+  emptyNoTwin: 'Aún no hay datos',
   emptyNoTags: 'Aún no hay puntos de medida',
   emptyNoTagsHint:
     'Los puntos aparecen cuando el robot los encuentra o los mide: ' + 'mándelo a hacer su ronda.',

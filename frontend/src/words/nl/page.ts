@@ -159,7 +159,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyUnreachableHint: 'Controleer of hij aanstaat. De pagina blijft het proberen.',
   emptyUnreachableMore:
     'De server is de bridge: “lupin-twin serve” op de robot, of “make run” voor de demo.',
-  emptyNoTwin: 'Nog geen digital twin',
+  emptyNoTwin: 'Nog geen gegevens',
   emptyNoTags: 'Nog geen meetpunten',
   emptyNoTagsHint:
     'Meetpunten verschijnen zodra de robot ze vindt of meet: ' + 'stuur hem op zijn ronde.',

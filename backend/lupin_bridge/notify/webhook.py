@@ -46,7 +46,7 @@ What = Literal["raised", "worse", "cleared", "withdrawn"]
 class Delivery(NamedTuple):
     """One change of one alarm; `id` is the same however often it is sent.
 
-    `also` are the other alarms of its cause, tag and moment, which are not worse.
+    `also` are the other alarms of its cause, tag and moment, raised as no worse.
     """
 
     id: str
@@ -73,8 +73,9 @@ class AlarmNews:
             key = what, alarm.tag_id, at_ns, cause_of(alarm_json(alarm))
             together.setdefault(key, []).append(it)
         for found in together.values():
-            # By what a restart does not change: the same id again.
-            first, *also = sorted(found, key=_worst_then)
+            # As it was raised, which a restart does not change: the same id again.
+            found.sort(key=lambda it: (ORDER[it.alarm.raised_as or it.alarm.reason.verdict], it.id))
+            first, *also = found
             yield first._replace(also=tuple(it.alarm for it in also))
 
     def _each(self, change: Change, now_ns: int | None) -> Iterator[Delivery]:
@@ -111,13 +112,6 @@ class AlarmNews:
             yield Delivery(f"{alarm.id}.raised", "raised", alarm)
         if alarm.is_worse and not was_worse:
             yield Delivery(f"{alarm.id}.worse.{alarm.reason.verdict}", "worse", alarm)
-
-
-def _worst_then(delivery: Delivery) -> tuple[int, str]:
-    alarm = delivery.alarm
-    is_raised = delivery.change == "raised"
-    verdict = alarm.raised_as if is_raised and alarm.raised_as else alarm.reason.verdict
-    return ORDER[verdict], alarm.id
 
 
 def signed(secret: bytes, delivery_id: str, now_s: int, body: bytes) -> dict[str, str]:

@@ -195,20 +195,17 @@ class PageText:
             names = (*names, "who")
         rows: dict[tuple[str, str], list[Entry]] = {}
         for entry in by_cause(alarms):
-            rows.setdefault(
-                (cause_of(entry), self._criteria.sensors.area_of(entry["tag_id"])), []
-            ).append(entry)
-        groups: dict[str, list[Entry]] = {"": []}
+            area = self._criteria.sensors.area_of(entry["tag_id"])
+            rows.setdefault((cause_of(entry), area), []).append(entry)
+        groups: dict[str, list[Entry]] = {}
         for (_, area), own in rows.items():
-            cause = " · ".join(filter(None, (area, self._cause(own))))
-            heading = f"{cause}: {self._count(len(own))}" if len(own) > MOST_LOOSE else ""
-            groups.setdefault(heading, []).extend(own)
+            cause = self._cause(own) if len(own) > MOST_LOOSE else ""
+            text = " · ".join(filter(None, (area, cause)))
+            heading = f"{text}: {self._count(len(own))}" if cause else ""
+            groups.setdefault(heading, []).extend(self._alarm(entry, cause) for entry in own)
 
-        def cells(entry: Entry) -> Iterable[str]:
-            found = self._alarm(entry)
-            # A heading has the cause of its rows.
-            found["alarm"] = found["times"] if entry not in groups[""] else found["alarm"]
-            return [found[name.removesuffix("*")] for name in names]
+        def cells(row: Entry) -> Iterable[str]:
+            return [row[name.removesuffix("*")] for name in names]
 
         return self._list(title, "alarms", groups, names, cells)
 
@@ -220,8 +217,8 @@ class PageText:
             if f"{word}_by" in alarm
         )
 
-    def _alarm(self, entry: Entry) -> dict[str, str]:
-        """The cells of a row, by their columns; of damp or dry air, the values are one sensor's."""
+    def _alarm(self, entry: Entry, heading: str) -> Entry:
+        """The cells of a row, by their columns; below a heading, it does not repeat the cause."""
         reason, tag, own = entry["reason"], self._tags.get(entry["tag_id"]), [entry, *entry["also"]]
         sensor, limit = reason["sensor"], reason["limit"]
         numbers, verdict = reason["kind"] == "range", self.words["verdicts"][reason["verdict"]]
@@ -236,20 +233,21 @@ class PageText:
                     at_end = number(it.value)
                     if at_end and it.observed_at_ns is not None:
                         at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
-        over = [
-            (it["raised_at"]["sec"], it["cleared_at"]["sec"]) for it in mine if it["cleared_at"]
-        ]
+        ends = [it["cleared_at"] for it in own if it["cleared_at"]]
+        lasted_s = [it["cleared_at"]["sec"] - it["raised_at"]["sec"] for it in mine if ends]
         cause, times = self._cause([entry]), f"{len(mine)}×" if len(mine) > 1 else ""
         worst = f"{worst} ({verdict})" if worst else verdict
+        if (heading or cause) != self._what(reason):
+            worst = f"{self._label(sensor)} {worst}"
         return {
-            "times": times,
-            "alarm": f"{cause} {times}".strip(),
+            "reason": reason,
+            "alarm": times if heading else f"{cause} {times}".strip(),
             "point": entry["tag_id"] or self.say("house"),
             "when": self._clock(min((it["raised_at"] for it in own), key=itemgetter("sec"))),
-            "end": self._clock({"sec": max(to_s for _, to_s in over)}) if over else "",
-            "length": self._length(sum(to_s - from_s for from_s, to_s in over)) if over else "",
+            "end": self._clock(max(ends, key=itemgetter("sec"))) if ends else "",
+            "length": self._length(sum(lasted_s)) if ends else "",
             "at_end": at_end,
-            "worst": worst if cause == self._what(reason) else f"{self._label(sensor)} {worst}",
+            "worst": worst,
             "limits": self._limits(reason, tag) if numbers else "",
             "who": "; ".join(dict.fromkeys(filter(None, map(self._who, own)))),
         }

@@ -71,6 +71,20 @@ def alarm(
     return Alarm(name, reason, tag_id, raised_ns, cleared_ns, 6.6)
 
 
+def damp_air(tag_id: str, raised_ns: int = NOW_NS) -> tuple[Alarm, Alarm]:
+    """Two alarms of one cause at one moment: of humidity, and the worse of VPD."""
+
+    def of(sensor: str, verdict: Verdict, value: float, limit: float) -> Alarm:
+        reason = Reason(Kind.RANGE, verdict, sensor, value, limit, raised_ns)
+        name = alarm_id(tag_id, "range", sensor, 0, raised_ns)
+        return Alarm(name, reason, tag_id, raised_ns, None, value, raised_as=verdict)
+
+    return (
+        of("humidity", Verdict.STRESSED, 93.0, 85.0),
+        of("vpd", Verdict.CRITICAL, 0.05, 0.1),
+    )
+
+
 class Alarms(AlarmBoard):
     """A board that a test writes: all alarms at once, as a feed finds them."""
 

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies, exposure
 from lupin_bridge.app import create_app, has_page
@@ -294,7 +293,7 @@ async def _run(
     push = None
     if targets.push is not None and access.people is not None:
         push = Push(targets.push, access.people, settings.site)
-    outward = Channels(targets, accounts_path(settings).parent, push)
+    outward = Channels(targets, push)
     bridge = Bridge(source, settings, criteria=criteria, outward=outward, limits=limits)
     app = create_app(bridge, access=access, proxies=proxies)
     announcements = (supervisor.stopping, bridge.announce_shutdown)

@@ -46,13 +46,13 @@ _QUANTILES: Final = (0.25, 0.5, 0.75)
 _DIGITS: Final = 9
 
 _HOURS: Final = """
-SELECT site, (hour - %(origin)s) / %(width)s AS bucket, sum(n), sum(total)
+SELECT site, (hour - :origin) / :width AS bucket, sum(n), sum(total)
 FROM hour JOIN (
     SELECT site, series, array_position(
-        ARRAY(SELECT json_array_elements_text(CAST(sensors AS json))), %(sensor)s) - 1 AS place
-    FROM series WHERE site = ANY(%(sites)s) AND kind = 0
+        ARRAY(SELECT json_array_elements_text(CAST(sensors AS json))), :sensor) - 1 AS place
+    FROM series WHERE site = ANY(:sites) AND kind = 0
 ) AS of_sensor USING (site, series)
-WHERE sensor = place AND hour >= %(origin)s AND hour < %(last)s GROUP BY site, bucket
+WHERE sensor = place AND hour >= :origin AND hour < :last GROUP BY site, bucket
 """
 
 
@@ -93,7 +93,7 @@ class Compare:
             "last": steps.end_ns // HOUR_NS,
             "width": steps.bucket_ns // HOUR_NS,
         }
-        found = log.connection.connection.execute(_HOURS, query).fetchall()
+        found = log.connection.execute(_HOURS, query).fetchall()
         return content_answer(orjson.dumps(self._body(_means(self, found))))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
@@ -213,20 +213,20 @@ _COUNTED: Final = {
 }
 _COUNTS: Final = """
 SELECT site, event, sum(n) FROM tally
-WHERE site = ANY(%(sites)s) AND hour >= %(first)s AND hour < %(last)s GROUP BY site, event
+WHERE site = ANY(:sites) AND hour >= :first AND hour < :last GROUP BY site, event
 UNION ALL SELECT site, 'notes', count(*) FROM note
-WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
-    AND made_at_ns >= %(start)s AND made_at_ns < %(end)s GROUP BY site
+WHERE site = ANY(:sites) AND kind != :withdraw
+    AND made_at_ns >= :start AND made_at_ns < :end GROUP BY site
 """
 _NOTES: Final = """
 SELECT site, id, made_at_ns, made_by, kind, subject, text, until_ns, gone.by, gone.at_ns
 FROM (
-    SELECT * FROM note WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
-        AND made_at_ns >= %(start)s AND made_at_ns < %(end)s
-    ORDER BY made_at_ns DESC, site, id LIMIT %(most)s
+    SELECT * FROM note WHERE site = ANY(:sites) AND kind != :withdraw
+        AND made_at_ns >= :start AND made_at_ns < :end
+    ORDER BY made_at_ns DESC, site, id LIMIT :most
 ) AS newest LEFT JOIN LATERAL (
     SELECT made_by AS by, made_at_ns AS at_ns FROM note AS other
-    WHERE other.site = newest.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || newest.id
+    WHERE other.site = newest.site AND kind = :withdraw AND subject = :withdrawn || newest.id
     ORDER BY other.made_at_ns, other.id LIMIT 1
 ) AS gone ON true
 ORDER BY made_at_ns DESC, site, id
@@ -250,7 +250,7 @@ class SitesReport:
 
     def __call__(self, log: LogReader) -> Answer:
         """A `PastQuery`: the answer, from the counts by site and event, and the newest notes."""
-        connection = log.connection.connection
+        connection = log.connection
         query = {
             "sites": [site for site, *_ in self.sites],
             "first": self.start_ns // HOUR_NS,

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
+from itertools import islice
 from typing import Any, Final
 
 import orjson
@@ -18,7 +19,7 @@ import orjson
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import ORDER, Health, Kind, Verdict, derive, worst
 from lupin_bridge.stream.frames import text_frame
-from lupin_bridge.stream.state_json import moment, reason_json, stamp
+from lupin_bridge.stream.state_json import cause_of, moment, reason_json, stamp
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, TagState
 from lupin_twin.field.grid import reach_of
@@ -86,19 +87,25 @@ def map_version(paths: str) -> str | None:
 MAX_CAUSES: Final = 2
 
 
-def causes(alarms: Iterable[tuple[Alarm, Mapping[str, Any]]]) -> tuple[dict[str, Any], ...]:
-    """The worst causes of alarms that come worst first: each with its worst alarm, and a count.
+def causes(alarms: Iterable[Mapping[str, Any]]) -> tuple[dict[str, Any], ...]:
+    """The worst causes of alarms that come worst first: each with its worst alarm and its tags.
 
-    Left out are alarms whose value is back in range, and the site's silence: its card shows that.
+    `air` is set if several sensors tell of damp or dry air. Left out are alarms whose value is back
+    in range, and the site's silence: its card shows that.
     """
-    found: dict[tuple[object, ...], dict[str, Any]] = {}
-    for alarm, entry in alarms:
-        verdict = verdict_now(entry)
-        if alarm.reason.kind is Kind.SILENT or verdict is Verdict.HEALTHY:
-            continue
-        first = {"reason": {**entry["reason"], "verdict": verdict}, "tag_id": alarm.tag_id}
-        found.setdefault(alarm.cause[1:], {**first, "count": 0})["count"] += 1
-    return tuple(found.values())[:MAX_CAUSES]
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for alarm in alarms:
+        if alarm["reason"]["kind"] != Kind.SILENT and verdict_now(alarm) is not Verdict.HEALTHY:
+            found.setdefault(cause_of(alarm), []).append(alarm)
+    return tuple(
+        {
+            "reason": {**own[0]["reason"], "verdict": verdict_now(own[0])},
+            "tag_id": own[0]["tag_id"],
+            "count": len({alarm["tag_id"] for alarm in own}),
+            "air": cause if len({alarm["reason"]["sensor"] for alarm in own}) > 1 else None,
+        }
+        for cause, own in islice(found.items(), MAX_CAUSES)
+    )
 
 
 def verdict_now(alarm: Mapping[str, Any]) -> Verdict:

@@ -127,10 +127,6 @@ class Watching:
 # --- the source of one site's page ----------------------------------------------------------------
 
 HEARTBEAT_S: Final = 1.0
-_AHEAD: Final = (
-    "The clock of this greenhouse is more than ten minutes ahead of the archive's: readings are"
-    " older than they look. Set the clock."
-)
 
 
 class SiteTwin(TwinSource):
@@ -238,9 +234,9 @@ class SiteTwin(TwinSource):
         if reported is None or not (is_live or said != self._said):
             return
         self._said = said
-        is_ahead = _newest_ns(reported) - self._watching.now_ns > MAX_AHEAD_NS
-        if is_ahead and reported.is_wall_clock:
-            problems = problems or (_AHEAD,)
+        is_ahead = (
+            reported.is_wall_clock and _newest_ns(reported) - self._watching.now_ns > MAX_AHEAD_NS
+        )
         stamp_ns = self._now_ns(reported)
         # By the same clock as `now`, if that is the wall's: a later moment would be refused.
         now_ns = stamp_ns if reported.is_wall_clock else self._watching.now_ns
@@ -251,7 +247,10 @@ class SiteTwin(TwinSource):
         before = None if self.update is None else self.update.snapshot
         self.update = TwinUpdate(
             replace(
-                reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot.tags)
+                reported.snapshot,
+                stamp_ns=stamp_ns,
+                tags=same_tags(before, reported.snapshot.tags),
+                clock="doubted" if is_ahead else "running",
             ),
             # Made of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",

@@ -28,7 +28,7 @@ from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
 from lupin_bridge.judge.scans import recent_writes
-from lupin_bridge.judge.verdict import Health, Verdict
+from lupin_bridge.judge.verdict import Health
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
@@ -266,10 +266,14 @@ class Watcher:
         # The last known state of a silent site does not grow old.
         moment_ns = now_ns if site.is_live else min(now_ns, max(site.heartbeat_ns, newest_ns))
         alarms = _alarms(site, judged, moment_ns)
-        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
+        is_ahead = newest_ns - now_ns > MAX_AHEAD_NS
+        judgement = judged.judge.see(
+            replace(judged.snapshot, stamp_ns=moment_ns, clock="doubted" if is_ahead else "running")
+        )
         if judged.alarms.is_caught_up:
             said = notes_of_alarms(alarms, judged.notes, now_ns)
-            tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if site.is_live else {}
+            is_current = site.is_live and not is_ahead
+            tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if is_current else {}
             active: list[tuple[Alarm, dict[str, Any]]] = [
                 (
                     alarm,
@@ -287,14 +291,13 @@ class Watcher:
             site = replace(
                 site,
                 active_alarms=len(calling),
-                causes=causes(calling),
+                causes=causes(entry for _, entry in calling),
                 alarms=tuple(entry for _, entry in active[:MAX_ALARMS]),
             )
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
-        is_ahead = newest_ns - now_ns > MAX_AHEAD_NS
         self.sites[name] = replace(
             site,
-            verdict=Verdict.UNKNOWN if is_ahead else judgement.house.verdict,
+            verdict=judgement.house.verdict,
             dots=dots(judged.snapshot.tags, judgement.tags),
         )
 

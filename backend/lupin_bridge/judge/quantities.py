@@ -277,13 +277,25 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Sensors:
-    """All sensors of a file; `text` is the file itself, which the bridge also serves."""
+    """All sensors of a file; `text` is the file itself, which the bridge also serves.
+
+    `areas` are bays, rows or zones, with the ids of their tags; `A*`: a prefix.
+    """
 
     by_name: Mapping[str, Sensor]
     fallback: Sensor
     saturation: float
     max_alpha: float
     text: str
+    areas: Mapping[str, Sequence[str]]
+
+    def area_of(self, tag_id: str) -> str:
+        """The area that names a tag, as on the page; empty: none."""
+        begins = (f"{tag_id[:end]}*" for end in range(len(tag_id) + 1))
+        found = (
+            area for name in (tag_id, *begins) for area, tags in self.areas.items() if name in tags
+        )
+        return next(found, "")
 
     def named(self, name: str) -> Sensor:
         """A sensor by name; one that is not in the file looks like `fallback`, without ranges."""

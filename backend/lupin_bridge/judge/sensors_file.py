@@ -111,7 +111,6 @@ class _File(_Part):
     ramp: _Ramp
     fallback: _Sensor
     sensors: dict[str, _Sensor]
-    # For readers of the file: bays, rows or zones, with the ids of their tags; `A*`: a prefix.
     areas: dict[_Name, list[_Name]] = {}
 
     @model_validator(mode="after")
@@ -142,6 +141,7 @@ def parse(text: str) -> Sensors:
         saturation=file.ramp.saturation,
         max_alpha=file.ramp.max_alpha,
         text=text,
+        areas=file.areas,
     )
 
 

@@ -1,22 +1,17 @@
 """All notification channels of a bridge, and the daily report that they send.
 
-Each channel sends the report once a day, also across restarts: a small file notes the last one
-sent. Missed days are sent at the next start, up to a week of them. A report that is not taken is
-retried as alarms are.
+A report that is not taken is retried as alarms are. As with alarms, nothing is noted of what was
+sent: after a start, the report of the last day comes once more, with the same id.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
 from functools import partial
-from hashlib import blake2b
-from pathlib import Path
 from typing import Final
 
 import orjson
@@ -41,38 +36,30 @@ log = logging.getLogger(__name__)
 POLL_S: Final = 2.0
 # How long a report waits for the log to be complete up to the end of the day.
 LATE_NS: Final = 300 * 1_000_000_000
-MOST_DAYS: Final = 7
 
 
-@dataclass(frozen=True, slots=True)
-class DailyTarget:
-    """When the operator's day ends, in which zone (None: this machine's), and where to note it.
+def ended_ns(at: time, zone: tzinfo | None, now_ns: int, days: int = 0) -> int:
+    """The end of the operator's last day that is over at a moment, or of the one `days` days later.
 
-    `folder` has a file for each channel and journal.
+    A day ends at `at` in `zone`; None: this machine's.
     """
-
-    at: time
-    zone: tzinfo | None
-    folder: Path
-
-    def ended_ns(self, now_ns: int, days: int = 0) -> int:
-        """The end of the last day that is over at a moment, or of the one `days` days later."""
-        now = datetime.fromtimestamp(now_ns // 1_000_000_000, self.zone)
-        passed = 0 if now.timetz().replace(tzinfo=None) >= self.at else 1
-        day = now.date() + timedelta(days=days - passed)
-        return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
+    now = datetime.fromtimestamp(now_ns // 1_000_000_000, zone)
+    passed = 0 if now.timetz().replace(tzinfo=None) >= at else 1
+    day = now.date() + timedelta(days=days - passed)
+    return int(datetime.combine(day, at, zone).timestamp()) * 1_000_000_000
 
 
 class DailyReport(Periodic):
-    """Sends reports by one channel; what was not taken before `stop` is sent after a restart."""
+    """Sends the report of each day by one channel."""
 
-    def __init__(self, target: DailyTarget, channel: Mqtt | Webhook, of: Source) -> None:
+    def __init__(self, at: time, channel: Mqtt | Webhook, of: Source) -> None:
         super().__init__(self._attempt, POLL_S, "the report of the day", first_s=0.0)
-        self._target, self._channel, self._of = target, channel, of
+        self._channel, self._of = channel, of
+        self._ended_ns = partial(ended_ns, at, of.criteria.clock.zone)
         known = NotRemembered, PastRefused, TwinUnavailableError, OSError
         self._guard = Guard(f"the report of the day is not sent by {channel.name}", *known)
-        # The last one sent, which is not sent again and again if that cannot be noted.
-        self._sent: tuple[Path, int] | None = None
+        # The end of the last day that was sent or skipped; 0: none.
+        self._sent_ns = 0
 
     async def _attempt(self) -> None:
         await self._guard.run(self._look())
@@ -85,38 +72,29 @@ class DailyReport(Periodic):
 
         """
         of = self._of
-        now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
+        now_ns, journal = of.ros_time_ns, of.source.journal()
         if now_ns is None or not journal.journal_id:
             return
         if unix_s(now_ns) is None:
             raise PastRefused("the time is simulated, and has no time of day")
-        file = self._file(journal.journal_id)
-        newest_ns = target.ended_ns(now_ns)
-        last_ns = _read(file)
-        if last_ns is None or last_ns > now_ns:
-            _write(file, newest_ns)  # the first one will be the next day's
+        newest_ns = self._ended_ns(now_ns)
+        if not 0 < self._sent_ns <= newest_ns:  # none yet, or the clock was ahead
+            self._sent_ns = self._ended_ns(newest_ns, -1)
+        due_ns = self._ended_ns(self._sent_ns, 1)
+        if due_ns > newest_ns:
             return
-        if last_ns >= newest_ns:
-            return
-        oldest_ns = target.ended_ns(now_ns, 1 - MOST_DAYS)
-        due_ns = target.ended_ns(last_ns, 1)
-        if due_ns < oldest_ns:
-            log.error("reports before %s are not sent: too many were missed", compact(oldest_ns))
-            due_ns = oldest_ns
         complete_ns = journal.complete_ns or 0
         if complete_ns < due_ns and now_ns < due_ns + LATE_NS:
             return
-        report = Report(target.ended_ns(due_ns, -1), due_ns, of.criteria, journal)
+        report = Report(self._ended_ns(due_ns, -1), due_ns, of.criteria, journal)
         try:
-            if self._sent != (file, due_ns):
-                await self._send(report)
+            await self._send(report)
         except PastRefused as error:
             if now_ns < due_ns + LATE_NS:
                 raise
             # It would be refused for ever, and hold up the days after it.
             log.error("the report up to %s is skipped: %s", compact(due_ns), error)  # noqa: TRY400
-        self._sent = file, due_ns
-        _write(file, due_ns)
+        self._sent_ns = due_ns
 
     async def _send(self, report: Report) -> None:
         found = await self._of.source.ask(partial(answered, report, ""), REPORT_S)
@@ -124,31 +102,6 @@ class DailyReport(Periodic):
         body, until = orjson.Fragment(found.answer.body), compact(report.end_ns)
         if not await self._channel.deliver(f"report.{until}", body):
             log.error("the report up to %s was given up by %s", until, self._channel.name)
-
-    def _file(self, journal_id: str) -> Path:
-        text = f"{self._channel.called} {journal_id}".encode()
-        return self._target.folder / f"report-{blake2b(text, digest_size=12).hexdigest()}.sent"
-
-
-def _read(file: Path) -> int | None:
-    try:
-        return int(file.read_text(encoding="ascii"))
-    except FileNotFoundError:
-        return None
-    except ValueError:
-        log.error("%s is damaged: the next report is tomorrow's", file)  # noqa: TRY400  # one line
-        return None
-
-
-def _write(file: Path, sent_ns: int) -> None:
-    """Note durably up to when reports were sent: what is not noted is sent again."""
-    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    new = file.with_suffix(".new")
-    with new.open("w", encoding="ascii") as out:
-        out.write(str(sent_ns))
-        out.flush()
-        os.fsync(out.fileno())
-    new.replace(file)
 
 
 # --- all channels together ------------------------------------------------------------------------
@@ -167,19 +120,10 @@ class DetachedThreads(ThreadPoolExecutor):
 
 
 class Channels:
-    """The channels that the operator has set up. Belongs to the event loop.
+    """The channels that the operator has set up. Belongs to the event loop."""
 
-    `folder` has the notes of which reports were sent.
-    """
-
-    def __init__(
-        self,
-        targets: Targets | None = None,
-        folder: Path = Path(),
-        push: Push | None = None,
-    ) -> None:
-        self._targets, self._folder = targets or Targets(), folder
-        self.push = push
+    def __init__(self, targets: Targets | None = None, push: Push | None = None) -> None:
+        self._targets, self.push = targets or Targets(), push
         self._running: list[Mqtt | Webhook | Push] = []
         self._reports: list[DailyReport] = []
 
@@ -201,8 +145,7 @@ class Channels:
         for channel in self._running:
             channel.start(source)
         if targets.report_at is not None:
-            daily = DailyTarget(targets.report_at, source.criteria.clock.zone, self._folder)
-            self._reports = [DailyReport(daily, it, source) for it in reporting]
+            self._reports = [DailyReport(targets.report_at, it, source) for it in reporting]
         for report in self._reports:
             report.start()
 

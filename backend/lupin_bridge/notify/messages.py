@@ -26,7 +26,7 @@ from lupin_bridge.judge.quantities import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.query_string import iso
 from lupin_bridge.stream.frames import NEVER_SEEN, Status
-from lupin_bridge.stream.state_json import alarm_json, moment, reason_json
+from lupin_bridge.stream.state_json import alarm_json, by_cause, moment, reason_json
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, TagState
 
@@ -186,11 +186,14 @@ def twin_payload(status: Status) -> dict[str, Any]:
 
 
 def alarms_payload(count: int, worst: Iterable[Alarm], *, is_known: bool) -> dict[str, Any]:
-    """How many alarms are active, and the worst; `state` is null until that is known."""
+    """How many alarms are active, and the worst, each with `also`: others of its cause at its tag.
+
+    `state` is null until that is known.
+    """
     return {
         "state": ("ON" if count else "OFF") if is_known else None,
         "count": count,
-        "alarms": [alarm_json(alarm) for alarm in worst],
+        "alarms": by_cause(map(alarm_json, worst)),
     }
 
 

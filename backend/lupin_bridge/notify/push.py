@@ -14,7 +14,7 @@ import base64
 import math
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from ipaddress import ip_address
@@ -34,9 +34,10 @@ from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget, address_of, path_of
 from lupin_bridge.notify.messages import Backoff, Condition, Source
 from lupin_bridge.notify.webhook import AlarmNews, PostError, post, until_taken
-from lupin_bridge.past.report_page import push_text
+from lupin_bridge.past.report_page import PageText
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.stream.state_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json, by_cause
+from lupin_twin.core.diagnostics import Origin
 
 if TYPE_CHECKING:
     from py_vapid import Vapid02
@@ -50,6 +51,8 @@ MAX_ATTEMPTS: Final = 66
 # Between the first two attempts, and between later ones, s.
 FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
+# Lines of one notification, each of one cause at a tag.
+MAX_PUSHED: Final = 4
 # Posts at once, to however many browsers.
 AT_ONCE: Final = 8
 # Threads of its own that look up names, more than an account has devices: a name server that never
@@ -135,13 +138,12 @@ class Push:
             else:
                 since_ns = now_ns - (time.monotonic() - self._started_s) * 1e9
             self._has_read = True
-        for _, what, alarm in self._news.of(change, now_ns):
-            if what not in ("raised", "worse"):
-                continue
-            at_ns = alarm.worse_at_ns or alarm.raised_at_ns
-            if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
-                self._new[alarm.id] = alarm
-                self._is_news.set()
+        for it in self._news.of(change, now_ns):
+            for alarm in (it.alarm, *it.also) if it.change in ("raised", "worse") else ():
+                at_ns = alarm.worse_at_ns or alarm.raised_at_ns
+                if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
+                    self._new[alarm.id] = alarm
+                    self._is_news.set()
 
     async def stop(self) -> None:
         """End at once."""
@@ -195,8 +197,8 @@ class Push:
     async def _send_owed(self, device: Device) -> None:
         source = self._source
         while owed := self._owed.pop(device.endpoint, None):
-            bodies = [alarm_json(alarm) for alarm in owed.values()]
-            title, body = push_text(bodies, device.language, source.criteria, source.origin)
+            page = PageText(device.language, source.criteria)
+            title, body = push_text(owed.values(), page, source.origin)
             title = f"{self._site}: {title}" if self._site else title
             await self._send(device, orjson.dumps({"title": title, "body": body}))
 
@@ -261,6 +263,18 @@ class Push:
                     f"{address} of {endpoint.host} is not a public address, see --push-private-host"
                 )
         return replace(endpoint, address=addresses[0])
+
+
+def push_text(alarms: Iterable[Alarm], page: PageText, origin: Origin) -> tuple[str, str]:
+    """Title and text of a notification of alarms: a line for each cause at a tag."""
+    found = by_cause(map(alarm_json, alarms))
+    title = page.say("alarm") if len(found) == 1 else f"{page.say('alarms')}: {len(found)}"
+    lines = [page.alarm(entry) for entry in found[:MAX_PUSHED]]
+    if len(found) > MAX_PUSHED:
+        lines.append(page.say("more", count=len(found) - MAX_PUSHED))
+    of = page.words["origins"].get(origin, "")
+    # A tag's name may be long, a push service takes 4 kB.
+    return f"{of}: {title}" if of else title, "\n".join(line[:200] for line in lines)
 
 
 def parsed(url: str, target: PushTarget) -> Endpoint:

@@ -27,9 +27,10 @@ import orjson
 from lupin_bridge.alarms.board import Change, happened_ns
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.verdict import ORDER
 from lupin_bridge.notify.destinations import Endpoint, WebhookTarget
 from lupin_bridge.notify.messages import Backoff, Condition, Source
-from lupin_bridge.stream.state_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json, cause_of
 
 log = logging.getLogger(__name__)
 
@@ -43,11 +44,15 @@ What = Literal["raised", "worse", "cleared", "withdrawn"]
 
 
 class Delivery(NamedTuple):
-    """One change of one alarm; `id` is the same however often it is sent."""
+    """One change of one alarm; `id` is the same however often it is sent.
+
+    `also` are the other alarms of its cause, tag and moment, raised as no worse.
+    """
 
     id: str
     change: What
     alarm: Alarm
+    also: tuple[Alarm, ...] = ()
 
 
 class AlarmNews:
@@ -60,6 +65,20 @@ class AlarmNews:
 
     def of(self, change: Change, now_ns: int | None) -> Iterator[Delivery]:
         """Yield the deliveries of a change; `now_ns` is ROS time; None: not known."""
+        # Damp air, say, is one message, whatever sensors tell of it.
+        together: dict[tuple[object, ...], list[Delivery]] = {}
+        for it in self._each(change, now_ns):
+            _, what, alarm, _ = it
+            at_ns = alarm.worse_at_ns if what == "worse" else happened_ns(alarm)
+            key = what, alarm.tag_id, at_ns, cause_of(alarm_json(alarm))
+            together.setdefault(key, []).append(it)
+        for found in together.values():
+            # As it was raised, which a restart does not change: the same id again.
+            found.sort(key=lambda it: (ORDER[it.alarm.raised_as or it.alarm.reason.verdict], it.id))
+            first, *also = found
+            yield first._replace(also=tuple(it.alarm for it in also))
+
+    def _each(self, change: Change, now_ns: int | None) -> Iterator[Delivery]:
         changed: Iterable[Alarm] = change.changed
         if change.is_past:
             newest_ns = max(map(happened_ns, changed), default=0)
@@ -169,8 +188,9 @@ class Webhook:
     async def _run(self) -> None:
         guard = Guard("the webhook had an error and continues")
         while True:
-            name, change, alarm = await self._waiting.get()
-            of = {"change": change, "alarm": alarm_json(alarm)}
+            name, change, alarm, also = await self._waiting.get()
+            alarms = {**alarm_json(alarm), "also": [alarm_json(it) for it in also]}
+            of = {"change": change, "alarm": alarms}
             error = await guard.run(self._send(name, of))
             if isinstance(error, Exception):
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")

@@ -13,6 +13,7 @@ from datetime import datetime, tzinfo
 from functools import cache, partial
 from html import escape
 from importlib.resources import files
+from operator import itemgetter
 from typing import Any, Final
 
 import orjson
@@ -22,6 +23,7 @@ from lupin_bridge.judge.judging import Criteria, unix_s
 from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.past.report import Report
 from lupin_bridge.serving.admission import content_answer
+from lupin_bridge.stream.state_json import by_cause, cause_of
 from lupin_twin.core.diagnostics import Origin
 
 HTML_TYPE: Final = "text/html; charset=utf-8"
@@ -33,8 +35,8 @@ PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Decimal comma and thousands point, in all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 _EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
-# Alarms in one notification.
-MAX_PUSHED: Final = 4
+# More tags than this that share a cause and an area are below one heading, as on the page.
+MOST_LOOSE: Final = 4
 Words = Mapping[str, Any]
 # An entry of a list in the body.
 Entry = Mapping[str, Any]
@@ -56,20 +58,6 @@ def languages() -> Collection[str]:
     return _words().keys()
 
 
-def push_text(
-    alarms: Sequence[Entry], lang: str, criteria: Criteria, origin: Origin
-) -> tuple[str, str]:
-    """Title and text of a notification of alarms, each as in `/api/alarms`."""
-    page = _Page(lang, criteria)
-    title = page.say("alarm") if len(alarms) == 1 else f"{page.say('alarms')}: {len(alarms)}"
-    lines = [page.alarm(alarm) for alarm in alarms[:MAX_PUSHED]]
-    if len(alarms) > MAX_PUSHED:
-        lines.append(page.say("more", count=len(alarms) - MAX_PUSHED))
-    of = _words()[lang]["origins"].get(origin, "")
-    # A tag's name may be long, a push service takes 4 kB.
-    return f"{of}: {title}" if of else title, "\n".join(line[:200] for line in lines)
-
-
 @dataclass(frozen=True, slots=True)
 class ReportPage(Report):
     """The report as a page in the language `lang`; times are in `zone`; None: the greenhouse's.
@@ -84,7 +72,7 @@ class ReportPage(Report):
 
     def plan(self, body: dict[str, Any]) -> Plan:
         """See `Report`."""
-        page = _Page(self.lang, self.criteria, self.zone).page(body, self.origin, self.site)
+        page = PageText(self.lang, self.criteria, self.zone).page(body, self.origin, self.site)
         headers = {**self._headers(), **PAGE_HEADERS}
         return of_content(content_answer(page.encode("utf-8", "replace"), HTML_TYPE, headers))
 
@@ -100,24 +88,27 @@ def _head(lang: str, title: str, period: str = "") -> str:
     )
 
 
-class _Page:
+class PageText:
+    """The texts of a report in a language; `words` are those of `report_words.json`."""
+
     def __init__(self, lang: str, criteria: Criteria, zone: tzinfo | None = None) -> None:
         self._lang = lang
         self._zone = zone or criteria.clock.zone
-        self._words = _words()[lang]
+        self.words = _words()[lang]
         self._criteria = criteria
         self._day = ""
         named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
     def page(self, body: Entry, origin: Origin, site: str) -> str:
+        """The whole page, of the body of a report."""
         say, at = self.say, self._at
         # Rows omit the date of the first day.
         day, comma, _ = at(body["from"]).rpartition(", ")
         self._day = f"{day}{comma}"
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
         heading = f"{say('title')}: {site}" if site else say("title")
-        hint = self._words["hints"].get(origin)
+        hint = self.words["hints"].get(origin)
         known = [
             say(word, at=at(body[name]))
             for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
@@ -174,15 +165,25 @@ class _Page:
         )
 
     def _of_alarms(self, title: str, alarms: Sequence[Entry], columns: Sequence[str]) -> str:
+        """A row for each cause at a tag, below a heading if many of an area share it."""
         names = ("alarm", "point", *columns)
         if any(self._who(alarm) for alarm in alarms):
             names = (*names, "who")
+        rows: dict[tuple[str, str], list[Entry]] = {}
+        for entry in by_cause(alarms):
+            area = self._criteria.sensors.area_of(entry["tag_id"])
+            rows.setdefault((cause_of(entry), area), []).append(entry)
+        groups: dict[str, list[Entry]] = {}
+        for (_, area), own in rows.items():
+            cause = self._cause(own) if len(own) > MOST_LOOSE else ""
+            text = " · ".join(filter(None, (area, cause)))
+            heading = f"{text}: {self._count(len(own))}" if cause else ""
+            groups.setdefault(heading, []).extend(self._alarm(entry, cause) for entry in own)
 
-        def cells(alarm: Entry) -> Iterable[str]:
-            found = self._alarm(alarm)
-            return [found[name.removesuffix("*")] for name in names]
+        def cells(row: Entry) -> Iterable[str]:
+            return [row[name.removesuffix("*")] for name in names]
 
-        return self._list(title, "alarms", alarms, names, cells)
+        return self._list(title, "alarms", groups, names, cells)
 
     def _who(self, alarm: Entry) -> str:
         """Who has acknowledged or shelved an alarm."""
@@ -192,19 +193,33 @@ class _Page:
             if f"{word}_by" in alarm
         )
 
-    def _alarm(self, alarm: Entry) -> Mapping[str, str]:
-        """The cells of an alarm, by their columns; its status is that of its worst value."""
-        reason, raised, cleared = alarm["reason"], alarm["raised_at"], alarm["cleared_at"]
-        verdict = self._words["verdicts"][reason["verdict"]]
-        worst = self._number(alarm["worst"], reason["sensor"], reason["limit"])
+    def _alarm(self, entry: Entry, heading: str) -> Entry:
+        """The cells of a row, by their columns; its status is that of its worst value.
+
+        Below a heading, it does not repeat the cause.
+        """
+        reason, own = entry["reason"], [entry, *entry["also"]]
+        sensor, limit = reason["sensor"], reason["limit"]
+        verdict = self.words["verdicts"][reason["verdict"]]
+        mine = [it for it in own if it["reason"]["sensor"] == sensor]
+        values = [it["worst"] for it in mine if it["worst"] is not None]
+        value = max(values, key=lambda it: abs(it - (limit or 0.0)), default=None)
+        worst = self._number(value, sensor, limit)
+        ends = [it["cleared_at"] for it in own if it["cleared_at"]]
+        lasted_s = [it["cleared_at"]["sec"] - it["raised_at"]["sec"] for it in mine if ends]
+        cause, times = self._cause([entry]), f"{len(mine)}×" if len(mine) > 1 else ""
+        worst = f"{worst} ({verdict})" if worst else verdict
+        if (heading or cause) != self._what(reason):
+            worst = f"{self._label(sensor)} {worst}"
         return {
-            "alarm": self._what(reason),
-            "point": alarm["tag_id"] or self.say("house"),
-            "when": self._clock(raised),
-            "end": "" if cleared is None else self._clock(cleared),
-            "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
-            "worst": f"{worst} ({verdict})" if worst else verdict,
-            "who": self._who(alarm),
+            "reason": reason,
+            "alarm": times if heading else f"{cause} {times}".strip(),
+            "point": entry["tag_id"] or self.say("house"),
+            "when": self._clock(min((it["raised_at"] for it in own), key=itemgetter("sec"))),
+            "end": self._clock(max(ends, key=itemgetter("sec"))) if ends else "",
+            "length": self._length(sum(lasted_s)) if ends else "",
+            "worst": worst,
+            "who": "; ".join(dict.fromkeys(filter(None, map(self._who, own)))),
         }
 
     def _sensor(self, of: Entry) -> Iterable[str]:
@@ -236,7 +251,7 @@ class _Page:
                 about = f"{self._what(alarm['reason'])}, {self._where(alarm['tag_id'])}"
             else:
                 about = self.say("alarm") if kind == "alarm" else self._where(name)
-            said = self._words["kinds"].get(note["kind"], note["kind"]), note["text"]
+            said = self.words["kinds"].get(note["kind"], note["kind"]), note["text"]
             text = ": ".join(it for it in said if it)
             text += f" ({self.say('withdrawn', name=gone)})" if gone else ""
             return self._clock(note["made_at"]), note["by"], text, about
@@ -257,32 +272,35 @@ class _Page:
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
         """A table of one list of the body, and how many entries are left out."""
-        return self._list(title, name, body[name], columns, cells) + self._more(body, name)
+        return self._list(title, name, {"": body[name]}, columns, cells) + self._more(body, name)
 
     def _list(
         self,
         title: str,
         name: str,
-        entries: Sequence[Entry],
+        groups: Mapping[str, Sequence[Entry]],
         columns: Sequence[str],
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
-        """A table; a column ending with `*` has numbers."""
+        """A table of entries by heading, "" for none; a column ending with `*` has numbers."""
         kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
         head = f"<h2>{escape(self.say(title))}</h2>"
-        if not entries:
+        if not any(groups.values()):
             return f"{head}<p>{escape(self.say('none'))}</p>"
         names = "".join(
             f'<th scope="col"{kind}>{escape(self.say(column.removesuffix("*")))}</th>'
             for column, kind in zip(columns, kinds, strict=True)
         )
         rows = ""
-        for entry in entries:
-            is_critical = entry.get("reason", {}).get("verdict") == "critical"
-            rows += '<tr class="critical">' if is_critical else "<tr>"
-            for cell, kind in zip(cells(entry), kinds, strict=True):
-                rows += f"<td{kind}>{escape(cell)}</td>"
-            rows += "</tr>"
+        for heading, entries in groups.items():
+            if heading:
+                rows += f'<tr><th colspan="{len(columns)}">{escape(heading)}</th></tr>'
+            for entry in entries:
+                is_critical = entry.get("reason", {}).get("verdict") == "critical"
+                rows += '<tr class="critical">' if is_critical else "<tr>"
+                for cell, kind in zip(cells(entry), kinds, strict=True):
+                    rows += f"<td{kind}>{escape(cell)}</td>"
+                rows += "</tr>"
         return (
             f'{head}<table class="{name}"><thead><tr>{names}</tr></thead>'
             f"<tbody>{rows}</tbody></table>"
@@ -295,17 +313,23 @@ class _Page:
 
     # --- words ------------------------------------------------------------------------------------
 
-    def alarm(self, alarm: Entry) -> str:
-        """An alarm on one line."""
-        reason = alarm["reason"]
-        verdict = self._words["verdicts"][reason["verdict"]]
-        return f"{self._where(alarm['tag_id'])}: {self._what(reason)} ({verdict})"
+    def alarm(self, entry: Entry) -> str:
+        """A cause at a tag on one line."""
+        verdict = self.words["verdicts"][entry["reason"]["verdict"]]
+        return f"{self._where(entry['tag_id'])}: {self._cause([entry])} ({verdict})"
 
     def say(self, word: str, **filled: object) -> str:
-        text: str = self._words[word]
+        """A text, its places filled."""
+        text: str = self.words[word]
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", str(value))
         return text
+
+    def _cause(self, rows: Sequence[Entry]) -> str:
+        """What is wrong; damp or dry air, if several sensors tell of it."""
+        sensors = {it["reason"]["sensor"] for row in rows for it in (row, *row["also"])}
+        air: Words = self.words["air"]
+        return self._what(rows[0]["reason"]) if len(sensors) == 1 else air[cause_of(rows[0])]
 
     def _what(self, reason: Entry) -> str:
         kind, sensor, value, limit = (reason[it] for it in ("kind", "sensor", "value", "limit"))
@@ -313,7 +337,7 @@ class _Page:
             kind = "low" if value < limit else "high"
         elif kind == "old" and sensor:
             kind = "old_sensor"
-        text: str = self._words["reasons"].get(kind, kind)
+        text: str = self.words["reasons"].get(kind, kind)
         return text.replace("{sensor}", self._label(sensor))
 
     def _label(self, sensor: str) -> str:
@@ -329,7 +353,7 @@ class _Page:
         if wall_s is None:
             return f"sim {sec // 3600:02}:{sec // 60 % 60:02}"
         at = datetime.fromtimestamp(wall_s, self._zone)
-        month = self._words["months"][at.month - 1]
+        month = self.words["months"][at.month - 1]
         return self.say("date", day=at.day, month=month, year=at.year, clock=f"{at:%H:%M}")
 
     def _clock(self, when: Mapping[str, int]) -> str:

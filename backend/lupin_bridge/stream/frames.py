@@ -64,8 +64,8 @@ _MESSAGES: dict[Reason, str] = {
     "Start the simulation, or the twin without use_sim_time.",
     "clock_stopped": "The twin's time has stopped: nothing comes on /clock any more. Ages are not "
     "known. Check the simulation.",
-    "clock_doubted": "The twin's clock contradicts its journal. Ages are not known. Set the clock; "
-    "after ten minutes it is believed as it is.",
+    "clock_doubted": "The twin's clock contradicts its journal or, in a fleet, is ahead of the "
+    "archive's. Ages are not known. Set the clock.",
     "never_seen": "Nothing has been received from a twin yet. Start it, or check ROS_DOMAIN_ID.",
     "stale": "The twin has fallen silent. Check that its process runs and is reachable.",
     "thread_dead": "The bridge's ROS thread has ended. Restart the bridge.",

@@ -329,8 +329,9 @@ class StatusFrame(Contract):
     twin: Literal["live", "offline"]
     reason: Reason = Field(
         description="paused: simulated time is paused, and the twin is live; no_clock, "
-        "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal. "
-        "In the last three, no age is known, and the twin counts as offline"
+        "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal, "
+        "or is ahead of the archive's. In the last three, no age is known, and the twin counts "
+        "as offline"
     )
     message: str = Field(description="for a person to read")
     state_age_seconds: float | None = Field(

@@ -282,6 +282,32 @@ def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
     return found
 
 
+# On which side of their ranges these tell of damp air; all follow from the same two readings.
+_IS_DAMP_LOW: Final = {"humidity": False, "vpd": True, "condensation_margin": True}
+
+
+def cause_of(alarm: Mapping[str, Any]) -> str:
+    """What is wrong: `damp` or `dry` air, else kind, sensor and side; as on the page."""
+    reason = alarm["reason"]
+    value, limit, sensor = reason["value"], reason["limit"], reason["sensor"]
+    if reason["kind"] != "range" or value is None or limit is None:
+        return f"{reason['kind']}|{sensor}"
+    is_low = value < limit
+    if sensor in _IS_DAMP_LOW:
+        return "damp" if is_low == _IS_DAMP_LOW[sensor] else "dry"
+    return f"{sensor}|{is_low}"
+
+
+def by_cause(alarms: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The first alarm of each cause at a tag, with the others in `also`; see `alarm_json`."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for alarm in alarms:
+        first = found.setdefault((alarm["tag_id"], cause_of(alarm)), {**alarm, "also": []})
+        if first["id"] != alarm["id"]:
+            first["also"].append(alarm)
+    return list(found.values())
+
+
 def note_json(note: Note, gone: Mapping[str, Note]) -> dict[str, Any]:
     """`routes_schema.Note`; `gone` is from `core.notes.withdrawals`."""
     by = gone.get(note.id)

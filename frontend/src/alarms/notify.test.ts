@@ -1,6 +1,7 @@
 /** Alarms outside the list: title, icon, voices, sound, notification. */
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import pushes from '../../public/sw.js?raw';
 import type { Alarm } from '../contract/types';
 import { act, receive, store } from '../store/app';
 import { announce } from '../store/create';
@@ -11,6 +12,7 @@ import { goLive, goLost, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import {
   badgeOf,
+  isPushed,
   notifyState,
   QUIET_MS,
   soundState,
@@ -238,7 +240,6 @@ describe('sound', () => {
 
 describe('notification', () => {
   const shown: { title: string; body: string; onclick?: () => void; close: () => void }[] = [];
-  const tags: string[] = [];
   /** Stand-in for the browser's Notification, which jsdom lacks. */
   const browser = (permission: string, answer = permission): { requests: number } => {
     const log = { requests: 0 };
@@ -253,10 +254,9 @@ describe('notification', () => {
       body: string;
       constructor(
         readonly title: string,
-        { body, tag }: { body: string; tag: string },
+        { body }: { body: string },
       ) {
         this.body = body;
-        tags.push(tag);
         shown.push(this);
       }
       close(): void {
@@ -268,7 +268,7 @@ describe('notification', () => {
     return log;
   };
   beforeEach(() => {
-    shown.length = tags.length = 0;
+    shown.length = 0;
     vi.spyOn(document, 'hasFocus').mockReturnValue(false);
   });
 
@@ -287,7 +287,7 @@ describe('notification', () => {
     expect(shown).toEqual([]);
   });
 
-  test('what comes later takes its place, and not in silence as under the same tag', async () => {
+  test('what comes later takes its place', async () => {
     browser('granted');
     start(startNotify);
     await setNotify(true);
@@ -295,7 +295,25 @@ describe('notification', () => {
     reportAlarms(warm);
     reportAlarms(warm, cold);
     expect(shown.map(({ title }) => title)).toEqual(['1 new alarm']);
-    expect(new Set(tags).size).toBe(2);
+  });
+
+  test('of an alarm that the bridge pushes too, the page and the push show one notification', async () => {
+    browser('granted');
+    start(startNotify);
+    await setNotify(true);
+    isPushed.set(true);
+    const showNotification = vi.fn();
+    const getRegistration = () => Promise.resolve({ showNotification });
+    vi.stubGlobal('navigator', { serviceWorker: { getRegistration } });
+    reportAlarms();
+    reportAlarms(cold);
+    await vi.waitFor(() => {
+      expect(showNotification).toHaveBeenCalledOnce();
+    });
+    const { tag, renotify } = showNotification.mock.lastCall?.[1] as Record<string, unknown>;
+    expect(pushes).toContain(`tag: '${String(tag)}', renotify: ${String(renotify)}`);
+    expect(shown).toEqual([]);
+    isPushed.set(false);
   });
 
   test('not while the page is in use', async () => {

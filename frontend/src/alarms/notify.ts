@@ -58,12 +58,12 @@ async function show(raised: readonly Item[]): Promise<void> {
   const origin = selectOrigin(store.get());
   const several = S.alarmNotifyTitle(raised.length);
   const title = origin === null ? several : `${S.origin[origin]}: ${several}`;
-  // New alarms get a new tag: browsers replace the same tag silently.
-  const options = {
-    body,
-    tag: `lupin-twin.alarms ${first.alarm.id} ${first.alarm.reason.verdict}`,
-  };
+  // The tag of the bridge's pushes in `sw.js`: of the same alarm, the later one takes the earlier one's place.
+  const options = { body, tag: 'lupin-twin.alarms', renotify: true };
+  // Only one that the service worker shows, too, has its place taken.
+  if (isPushed.get() && (await showByWorker(title, options))) return;
   try {
+    // Browsers replace the same tag silently.
     last?.close();
     const shown = new Notification(title, options);
     last = shown;
@@ -74,14 +74,16 @@ async function show(raised: readonly Item[]): Promise<void> {
     };
   } catch {
     // Phones leave this to the service worker, and throw only here.
-    const worker = await registration().catch(() => undefined);
-    if (worker) {
-      await worker.showNotification(title, options);
-      return;
-    }
+    if (await showByWorker(title, options)) return;
     notifyState.set('none');
     updateNotifySettings({ notify: false });
   }
+}
+
+async function showByWorker(title: string, options: NotificationOptions): Promise<boolean> {
+  const worker = await registration().catch(() => undefined);
+  await worker?.showNotification(title, options);
+  return worker !== undefined;
 }
 
 /** Notifies of new alarms if enabled and the page is not in use; returns a stop function. */

@@ -182,6 +182,11 @@ describe('a reason in words', () => {
     [{ kind: 'pest', sensor: '', value: 3, limit: null } as const, 5, '3 pests seen'],
     [{ kind: 'pest', sensor: '', value: 0, limit: null } as const, 5, 'Pest seen'],
     [
+      { kind: 'pest', sensor: '', value: 3, limit: null } as const,
+      9 * 86_400,
+      `3 pests seen (9${NBSP}d ago)`,
+    ],
+    [
       { ...old, limit: 1_800 },
       345_600,
       `Not scanned for 4${NBSP}d (readings are valid for 30${NBSP}min)`,

@@ -185,7 +185,8 @@ export function reasonText(
         age === null ? null : ageText(age),
       );
     case 'pest':
-      return R.pest(value ?? 0);
+      // It stays until the next inspection: its alarm, days back, may not be listed any more.
+      return `${R.pest(value ?? 0)}${age !== null && age >= 86_400 ? ago : ''}`;
     case 'old':
       return R.old(
         label,

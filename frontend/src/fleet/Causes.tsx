@@ -13,11 +13,10 @@ export type CauseText = (cause: Cause) => string;
 export default function Causes({ onWords }: { onWords: (text: CauseText) => void }): null {
   const sensors = useSensors();
   useEffect(() => {
-    onWords(({ count, ...worst }) => {
+    onWords(({ count, air, ...worst }) => {
       const where = count > 1 ? S.shownOf(count, count) : whereText(worst);
-      return worst.tag_id === ''
-        ? causeWords(worst, sensors)
-        : `${causeWords(worst, sensors)} · ${inOnePiece(where)}`;
+      const cause = air ? S.airCause[air] : causeWords(worst, sensors);
+      return worst.tag_id === '' ? cause : `${cause} · ${inOnePiece(where)}`;
     });
   }, [sensors, onWords]);
   return null;

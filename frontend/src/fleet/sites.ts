@@ -30,11 +30,13 @@ export type Site = Omit<SiteEntry, 'lag_s'> & {
   readonly heardAt: number | null;
 };
 
-/** One cause of alarms: its worst alarm's reason and tag, and how many there are. */
+/** One cause of alarms: its worst alarm's reason and tag, and at how many tags. */
 export interface Cause {
   readonly reason: HealthReason;
   readonly tag_id: string;
   readonly count: number;
+  /** Set if several sensors tell of it. */
+  readonly air: 'damp' | 'dry' | null;
 }
 
 export interface Archive {

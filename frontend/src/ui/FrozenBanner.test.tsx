@@ -60,7 +60,7 @@ test.each([
   (reason, todo, why) => {
     showTags([wireTag()]);
     const detail = 'the clock contradicts the journal, written until 2026-11-30T18:45:24Z';
-    const journal = { ...status().journal, detail };
+    const journal = { ...status().journal, state: 'doubting', detail } as const;
     goLive(status({ twin: 'offline', reason, journal }));
     render(
       <>
@@ -80,6 +80,14 @@ test.each([
     expect(more).toContain(reason === 'clock_doubted' ? `until ${until}.` : '/clock');
   },
 );
+
+test('the clock of a fleet’s greenhouse may be ahead, while its recording goes on', () => {
+  showTags([wireTag()]);
+  goLive(status({ twin: 'offline', reason: 'clock_doubted' }));
+  render(<FrozenBanner />);
+  expect(text()).toMatch(/Set the twin’s clock. It is ahead of the archive’s clock/);
+  expect(text()).not.toContain('recording');
+});
 
 test('each state of the connection has a word of its own', () => {
   showTags([wireTag()]);

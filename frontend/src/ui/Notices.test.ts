@@ -21,7 +21,11 @@ describe('before the first state', () => {
     expect(noticeFor({ ...empty, twin: { ...lost, latest: NO_HOUSE } })?.id).toBe('unreachable');
     goLive(status({ twin: 'offline', reason: 'never_seen' }));
     const offline = { ...store.get().twin, latest: NO_HOUSE };
-    expect(noticeFor({ ...empty, twin: offline })).toMatchObject({ id: 'no-twin' });
+    expect(noticeFor({ ...empty, twin: offline })?.hint).toMatch(/Is the twin switched on/);
+    // Of a fleet's archive that is down, nothing is said of the twin.
+    goLive(status({ twin: 'offline', reason: 'never_seen', input_problems: ['it is down'] }));
+    const down = { ...store.get().twin, latest: NO_HOUSE };
+    expect(noticeFor({ ...empty, twin: down })).toMatchObject({ title: 'No data yet', hint: '' });
   });
 });
 

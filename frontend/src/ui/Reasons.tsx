@@ -40,13 +40,14 @@ export function useCauseText(
   });
 }
 
-/** When the attempt or reading behind a tag's reason was made; null: the text needs no age. */
+/** When the attempt, inspection or reading behind a tag's reason was made; null: the text needs no age. */
 function whenShown(
   { kind, sensor, since }: HealthReason,
   then: TagThen,
   isReceiving: boolean,
 ): When | null {
-  const { failedAttempt, readAt, scannedAt } = then.tag;
+  const { failedAttempt, inspectedAt, readAt, scannedAt } = then.tag;
+  if (kind === 'pest') return inspectedAt;
   if (kind === 'scan_failed') return failedAttempt?.at ?? 'unknown';
   const isRecent = isReceiving && !isOldReading(sensor, then);
   return (kind === 'old' ? since !== null : sensor !== '' && !isRecent)

@@ -68,6 +68,14 @@ describe('card', () => {
     expect(card.textContent).toContain('3 pests seen');
     expect(card.textContent).toContain('pests seenInspect and treat the plants');
     expect(card.textContent).toContain('Critical');
+    // Until the next inspection, however long ago this one was: its alarm is not listed any more.
+    const looked_at = { sec: nextStamp() - 9 * 86_400 - 60, nanosec: 0 };
+    const pest = reason({ kind: 'pest', sensor: '', value: 3, limit: null });
+    flush(() => {
+      showTags([wireTag({ tag_id: '7', looked_at })], judgement({ 7: [pest] }));
+      act(withTag('7'));
+    });
+    expect(card.textContent).toContain('3 pests seen (9\u00a0d ago)');
     expect(card.textContent).toContain('x 1.00 m, y 2.00 m');
   });
 

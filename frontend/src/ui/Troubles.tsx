@@ -135,14 +135,22 @@ export function Troubles(): JSX.Element {
   );
 }
 
-/** Why the bridge calls the twin offline, in words for an operator. */
+/** Why the bridge calls the twin offline, in words for an operator; empty: a trouble above says it. */
 export function offlineReason(status: StatusFrame | null): string {
-  return textFor(S.offlineWhy, status?.reason) ?? S.frozenWhy.offline;
+  if (isUnreceived(status)) return '';
+  // A fleet doubts a clock that is ahead of the archive's; its journal goes on.
+  const isAhead = status?.reason === 'clock_doubted' && status.journal.state !== 'doubting';
+  const reason = isAhead ? 'clock_ahead' : status?.reason;
+  return textFor(S.offlineWhy, reason) ?? S.frozenWhy.offline;
 }
 
 /** The same for whoever maintains the system; undefined: nothing to add. */
 export const offlineMore = (status: StatusFrame | null): string | undefined =>
-  textFor(S.offlineMore, status?.reason);
+  isUnreceived(status) ? undefined : textFor(S.offlineMore, status?.reason);
+
+/** Whether nothing was ever received and the server knows why, such as an archive that is down. */
+const isUnreceived = (status: StatusFrame | null): boolean =>
+  status?.reason === 'never_seen' && status.input_problems.length > 0;
 
 /** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {

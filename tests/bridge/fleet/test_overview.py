@@ -13,11 +13,12 @@ from xml.etree import ElementTree
 import pytest
 
 from lupin_bridge.fleet import source
-from lupin_bridge.fleet.overview import Site, dots, map_svg, map_version
+from lupin_bridge.fleet.overview import Site, causes, dots, map_svg, map_version
 from lupin_bridge.fleet.reader import Reported, latest
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.settings import Settings
+from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Pose, Snapshot, TagState
@@ -25,6 +26,7 @@ from lupin_twin.runtime.workers import Workers
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import fleet, forward, frames, recent_scans, wall, write
 from tests.support.journal import append, recording, scan
+from tests.support.seen import damp_air
 from tests.support.waiting import until, wait_for
 
 
@@ -282,3 +284,15 @@ async def test_a_process_is_checked_as_long_as_it_does_not_answer(
     watching.start()
     await until(lambda: len(checks) > 1, "another check")
     await watching.stop()
+
+
+def test_damp_air_is_one_cause_of_a_card_and_its_tags_are_counted() -> None:
+    def of(*tags: str) -> list[dict[str, Any]]:
+        alarms = chain.from_iterable(map(damp_air, tags))
+        return list(causes({**alarm_json(it), "now": None} for it in alarms))
+
+    (both,) = of("1", "2")
+    assert (both["tag_id"], both["count"], both["air"]) == ("1", 2, "damp")
+    humid, _ = damp_air("1")
+    (one,) = causes([{**alarm_json(humid), "now": None}])
+    assert one["air"] is None, "one sensor keeps its name"

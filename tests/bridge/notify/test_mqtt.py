@@ -22,7 +22,7 @@ from lupin_bridge.notify.mqtt import Mirror, Mqtt
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.state import Reading
 from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
-from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, seen, tag
+from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, damp_air, seen, tag
 from tests.support.tls import certificate
 from tests.support.waiting import PATIENCE_S, until
 
@@ -336,6 +336,9 @@ def test_alarms_are_sent_for_the_tag_and_for_the_greenhouse() -> None:
     assert news["lt/tags/a/alarms"]["state"] == "ON"
     assert news["lt/tags/a/alarms"]["alarms"][0]["worst"] == 6.6
     assert news["lt/house/alarms"]["count"] == 2
+    # Damp air is one entry, whatever sensors tell of it.
+    (damp,) = reported(one, seen(state, alarms=damp_air("a")))["lt/tags/a/alarms"]["alarms"]
+    assert (damp["reason"]["sensor"], len(damp["also"])) == ("vpd", 1)
     news = reported(one, seen(state, alarms=(alarm("a", cleared_ns=NOW_NS),)))
     assert (news["lt/tags/a/alarms"]["state"], news["lt/house/alarms"]["state"]) == ("OFF", "OFF")
 

@@ -31,8 +31,9 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
-from lupin_bridge.notify.push import Push, encoded
+from lupin_bridge.notify.push import Push, encoded, push_text
 from lupin_bridge.notify.webhook import post
+from lupin_bridge.past.report_page import PageText
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
 from tests.support.messages import inspection
@@ -47,7 +48,7 @@ from tests.support.people import (
 )
 from tests.support.processes import constants
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
-from tests.support.seen import NOW_NS, Alarms, S, alarm
+from tests.support.seen import NOW_NS, Alarms, S, alarm, damp_air
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import Bridge, bridge
@@ -194,6 +195,14 @@ async def test_a_message_waits_while_an_error_lasts_or_the_accounts_cannot_be_re
         await until(lambda: "will be retried: there is no file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: len(on.service.posted) == 2, "the next attempt")
+
+
+def test_damp_air_is_one_line_whatever_sensors_tell_of_it() -> None:
+    page = PageText("en", Criteria.of(Settings()))
+    assert push_text(damp_air("7"), page, "robot") == ("Alarm", "Tag 7: Air too damp (stressed)")
+    title, body = push_text((*damp_air("7"), *map(alarm, "123456")), page, "simulated")
+    assert title == "Simulated: Alarms: 7"
+    assert body.endswith("Tag 3: Temperature too low (critical)\nNot listed: 3 more.")
 
 
 async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named
 from tests.support.processes import free_port
 from tests.support.receiver import Answer, Posted, receiver, silence, status
-from tests.support.seen import NOW_NS, Alarms, S, alarm
+from tests.support.seen import NOW_NS, Alarms, S, alarm, damp_air
 from tests.support.tls import certificate
 from tests.support.waiting import PATIENCE_S, until
 
@@ -245,6 +245,22 @@ def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_id
     assert ids == [("raised", f"{active.id}.raised")]
     after = put(AlarmNews(), old, active, just, missed, is_past=True)
     assert after == [*ids, ("cleared", f"{just.id}.cleared.{edge}")]
+
+
+def test_damp_air_is_one_message_whatever_sensors_tell_of_it() -> None:
+    humid, dense = damp_air("a")
+    for alarms, is_past in (((humid, dense), False), ((dense, humid), True)):
+        (raised,) = AlarmNews().of(Change(alarms, is_past=is_past), NOW_NS)
+        # The worst has the others beside it, and its id is the same after a restart.
+        assert (raised.id, raised.alarm, raised.also) == (f"{dense.id}.raised", dense, (humid,))
+    news = AlarmNews()
+    assert len(put(news, humid)) == 1
+    assert [name for _, name in put(news, humid, dense)] == [f"{dense.id}.raised"], "a later one"
+    (cleared,) = news.of(
+        Change(tuple(replace(it, cleared_at_ns=NOW_NS + S) for it in (humid, dense))), NOW_NS
+    )
+    assert (cleared.change, len(cleared.also)) == ("cleared", 1)
+    assert len(put(AlarmNews(), humid, *damp_air("b"), *damp_air("a", NOW_NS + S))) == 3
 
 
 def target(url: str, ca: str = "") -> WebhookTarget:

@@ -69,13 +69,20 @@ def body(hours: int) -> dict[str, Any]:
 def alarm(**message: Any) -> dict[str, Any]:
     reason = {"verdict": "critical", "kind": "pest", "sensor": "", "value": 3.0, "limit": None}
     when = {"raised_at": at(60), "cleared_at": None}
-    return {"id": "9", "tag_id": "7", "reason": reason, "worst": 3.0, **when, **message}
+    found = {"tag_id": "7", "reason": reason, "worst": 3.0, **when, **message}
+    return {"id": f"{found['tag_id']} {found['raised_at']} {found['reason']}", **found}
 
 
-def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None, **fields: object) -> str:
+def page_of(
+    lang: str = "en",
+    hours: int = 8,
+    zone: tzinfo | None = None,
+    criteria: Criteria = GREENHOUSE,
+    **fields: object,
+) -> str:
     """The report's text, with spaces between its elements."""
     end_s = BEGUN_S + hours * HOUR_S
-    page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN_JOURNAL, lang, zone)
+    page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, criteria, UNKNOWN_JOURNAL, lang, zone)
     return text_of(page, hours, **fields)
 
 
@@ -118,10 +125,11 @@ def test_times_are_those_of_the_greenhouse_or_of_a_given_zone() -> None:
     assert "27 Nov 2026, 10:45 to 28 Nov 2026, 06:45. Times: Asia/Kathmandu (UTC+05:45)" in page
     assert " 10:50 12:08 1 h 18 min" in page
     page = page_of(
-        hours=20, alarms=[alarm(raised_at=at(19 * HOUR_S)), alarm(raised_at=at(-8 * HOUR_S))]
+        hours=20,
+        alarms=[alarm(raised_at=at(19 * HOUR_S)), alarm(tag_id="8", raised_at=at(-8 * HOUR_S))],
     )
     assert "7 28 Nov, 01:00" in page
-    assert "7 26 Nov, 22:00" in page
+    assert "8 26 Nov, 22:00" in page
 
 
 def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_content() -> None:
@@ -151,7 +159,8 @@ def test_an_alarm_row_names_its_tag_or_the_greenhouse_and_who_acknowledged_it() 
     assert "Pest seen 7 06:01" in page
     assert "Pest seen Greenhouse 06:01" in page
     assert "Acknowledged, shelved" not in page, "a column that is not needed"
-    page = page_of(alarms=[alarm(), alarm(acknowledged_by="Anna", acknowledged_at=at(120))])
+    known = alarm(tag_id="8", acknowledged_by="Anna", acknowledged_at=at(120))
+    page = page_of(alarms=[alarm(), known])
     assert "Acknowledged, shelved" in page
     assert page.count("acknowledged by Anna, 06:02") == 1
 
@@ -224,3 +233,36 @@ def test_a_length_has_no_zero_and_a_share_is_whole_only_if_all_is_there() -> Non
         assert f" {text} Tags not scanned" in page
     counts = body(8)["counts"] | {"tags": 201, "tags_scanned": 200}
     assert "200 of 201 (99 %)" in page_of(counts=counts)
+
+
+WARM = {"verdict": "stressed", "kind": "range", "sensor": "temperature", "value": 30.0}
+
+
+@pytest.mark.parametrize("title", ["Alarms still active ", "Alarms resolved "])
+def test_tags_that_share_a_cause_and_an_area_are_below_one_heading(title: str) -> None:
+    when = {"cleared_at": None if "active" in title else at(120)}
+    areas = replace(GREENHOUSE.sensors, areas={"North": ["0", "1*"]})
+    many = [alarm(tag_id=str(n), reason={**WARM, "limit": 26.0}, **when) for n in range(15)]
+    page = page_of(criteria=replace(GREENHOUSE, sensors=areas), alarms=[alarm(**when), *many])
+    found = page.partition(title)[2]
+    # A row does not repeat the cause; the worst comes first, and few need no heading.
+    assert "North · Temperature too high: 7 0 06:01" in found
+    assert "Temperature too high: 8 2 06:01" in found
+    assert found.index("Pest seen 7") < found.index("Temperature too high: 8")
+
+
+def test_what_came_several_times_is_one_row_and_so_is_damp_air_by_several_sensors() -> None:
+    hot = [
+        alarm(reason={**WARM, "limit": 26.0}, worst=worst, raised_at=at(from_s), cleared_at=at(to))
+        for worst, from_s, to in ((28.0, 7200, 9000), (31.0, 60, 660))
+    ]
+    damp = {**WARM, "sensor": "humidity", "value": 93.0, "limit": 85.0}
+    dense = {**WARM, "sensor": "vpd", "value": 0.15, "limit": 0.2}
+    air = [
+        alarm(reason=damp, worst=96.0, raised_at=at(300)),
+        alarm(reason=dense, worst=0.1, acknowledged_by="Anna", acknowledged_at=at(120)),
+    ]
+    page = page_of(alarms=[*air, *hot])
+    assert "Temperature too high 2× 7 06:01 08:30 40 min 31.0 °C (stressed)" in page
+    assert "Air too damp 7 06:01 Humidity 96.0 % (stressed) acknow" in page
+    assert "Vapour" not in page

@@ -49,6 +49,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       'Von dort kommt die Zeit des Zwillings; sie steht still. Das Alter der Werte ist unbekannt.',
     clock_doubted:
       'Sie geht gegenüber der Aufzeichnung nach. Bis sie stimmt, höchstens zehn Minuten lang, ist das Alter der Werte unbekannt, und die Aufzeichnung wartet.',
+    clock_ahead: 'Sie geht gegenüber dem Archiv vor; das Alter der Werte ist unbekannt.',
     never_seen:
       'Der Server hat noch keine Daten von einem Zwilling. Ist der Zwilling eingeschaltet?',
     stale: 'Der Zwilling sendet nicht mehr. Bitte prüfen, ob er läuft.',
@@ -154,7 +155,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyUnreachableHint: 'Bitte prüfen, ob er eingeschaltet ist. Die Seite versucht es weiter.',
   emptyUnreachableMore:
     'Der Server ist die Bridge: „lupin-twin serve“ auf dem Roboter oder „make run“ für die Demo.',
-  emptyNoTwin: 'Noch kein Zwilling',
+  emptyNoTwin: 'Noch keine Daten',
   emptyNoTags: 'Noch keine Messpunkte',
   emptyNoTagsHint:
     'Messpunkte erscheinen, sobald der Roboter sie findet oder misst: ' +

@@ -50,6 +50,7 @@ export const PAGE = {
       'The twin’s time comes from there, and it has stopped. The age of the readings is unknown.',
     clock_doubted:
       'It is behind the recorded data. Until it is right, or for ten minutes, ages are unknown and recording waits.',
+    clock_ahead: 'It is ahead of the archive’s clock, so ages are unknown.',
     never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
     stale: 'The twin has stopped sending. Check that it is running.',
     thread_dead: 'The server has lost contact with the twin and must be restarted.',
@@ -157,7 +158,7 @@ export const PAGE = {
   emptyUnreachableHint: 'Check that it is switched on. The page keeps trying.',
   emptyUnreachableMore:
     'The server is the bridge: “lupin-twin serve” on the robot, or “make run” for the demo.',
-  emptyNoTwin: 'No twin yet',
+  emptyNoTwin: 'No data yet',
   emptyNoTags: 'No tags yet',
   emptyNoTagsHint: 'Tags appear when the robot finds or scans them: start its patrol.',
   emptyNoTagsMore: '“lupin-twin demo” shows a simulated patrol.',

@@ -47,6 +47,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       'El gemelo toma de ella la hora, que se ha parado. Se desconoce la antigüedad de las lecturas.',
     clock_doubted:
       'Va atrasado respecto a los datos registrados. Hasta que esté en hora, o durante diez minutos, se desconoce la antigüedad de las lecturas y el registro espera.',
+    clock_ahead: 'Va adelantado respecto al archivo; se desconoce la antigüedad de las lecturas.',
     never_seen: 'El servidor aún no ha recibido nada de un gemelo. ¿Está encendido el gemelo?',
     stale: 'El gemelo ha dejado de enviar. Compruebe que está en marcha.',
     thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
@@ -151,7 +152,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyUnreachableHint: 'Compruebe que está encendido. La página lo sigue intentando.',
   emptyUnreachableMore:
     'El servidor es el puente («bridge»): «lupin-twin serve» en el robot, o «make run» para la demostración.',
-  emptyNoTwin: 'Aún no hay gemelo',
+  emptyNoTwin: 'Aún no hay datos',
   emptyNoTags: 'Aún no hay puntos de medida',
   emptyNoTagsHint:
     'Los puntos aparecen cuando el robot los encuentra o los mide: ' + 'mándelo a hacer su ronda.',

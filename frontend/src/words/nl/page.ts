@@ -47,6 +47,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       'Daar haalt de digital twin zijn tijd vandaan; die staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_doubted:
       'Die loopt achter op de vastgelegde gegevens. Tot de klok goed staat, hooguit tien minuten, is onbekend hoe oud de meetwaarden zijn en wacht het vastleggen.',
+    clock_ahead: 'Die loopt voor op het archief; hoe oud de meetwaarden zijn, is onbekend.',
     never_seen:
       'De server heeft nog niets van een digital twin ontvangen. Staat de digital twin aan?',
     stale: 'De digital twin stuurt niets meer. Controleer of hij draait.',
@@ -153,7 +154,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyUnreachableHint: 'Controleer of hij aanstaat. De pagina blijft het proberen.',
   emptyUnreachableMore:
     'De server is de bridge: “lupin-twin serve” op de robot, of “make run” voor de demo.',
-  emptyNoTwin: 'Nog geen digital twin',
+  emptyNoTwin: 'Nog geen gegevens',
   emptyNoTags: 'Nog geen meetpunten',
   emptyNoTagsHint:
     'Meetpunten verschijnen zodra de robot ze vindt of meet: ' + 'stuur hem op zijn ronde.',

@@ -3,14 +3,17 @@
 import colorsys
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pytest
 from geometry_msgs.msg import Point, Pose
 from playwright.sync_api import expect
 
 import lupin_bridge
 from tests.browser.hmi import OpenPage, Pixel
+from tests.browser.places import expect_in_reach, places
 from tests.support.messages import occupancy_grid, scan
 from tests.support.web import Bridge, bridge
 
@@ -158,3 +161,64 @@ def test_a_label_is_as_wide_as_its_text(greenhouse: Bridge, open_page: OpenPage)
     for text, picture, wide in hmi.page.evaluate("labels"):
         # 5 pixels of padding on each side, all in whole pixels.
         assert picture == math.ceil(wide) + 10, text
+
+
+# Created before `open_page`, so that it ends after the pages.
+@pytest.fixture
+def running(domain: int) -> Iterator[Bridge]:
+    with bridge(domain=domain) as empty:
+        yield empty
+
+
+def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
+    running: Bridge, open_page: OpenPage
+) -> None:
+    running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
+    hmi = open_page(running.url, viewport={"width": 1440, "height": 900})
+    parts = (".health", ".map-panel", ".list")
+    status, map_, table = places(hmi, *parts)
+    assert (status.left, status.bottom) == (table.left, table.top)
+    narrow = map_.right
+    running.peer.publish_map(occupancy_grid([[0] * 60] * 18))
+    expect(hmi.page.locator(".panels")).to_have_attribute("data-wide", "true")
+    for size in ((1440, 900), (1100, 800)):
+        hmi.resize(*size)
+        status, map_, table = places(hmi, *parts)
+        assert (status.left, status.bottom) == (map_.left, map_.top), size
+        assert (table.left, table.top) == (map_.right, status.top), size
+        expect_in_reach(hmi, ".map-controls button, .legend, tbody tr, .health button")
+        assert (
+            hmi.page.locator(".table-scroll").evaluate("e => e.scrollWidth - e.clientWidth") == 0
+        ), size
+        assert size != (1440, 900) or map_.right > 1.2 * narrow
+        # In the order of reading for the keyboard, too.
+        expect(hmi.page.locator(".health, .map-panel").first).to_have_class("health")
+    hmi.resize(820, 1180)
+    hmi.page.locator(".pane-tabs").get_by_role("button", name="Map").click()
+    map_, table = places(hmi, ".map-panel", ".list")
+    assert (map_.left, map_.bottom) == (table.left, table.top - 1)
+    expect_in_reach(hmi, ".map-controls button, .legend, tbody tr")
+    # The tag's card takes the table's place; a phone shows one of the three.
+    hmi.row("1").click()
+    expect(hmi.card("1")).to_be_visible()
+    expect(hmi.page.locator(".list")).to_be_hidden()
+    hmi.turn("")
+    hmi.resize(360, 640)
+    hmi.page.locator(".pane-tabs").get_by_role("button", name="Tags").click()
+    expect(hmi.map).to_be_hidden()
+    status, table = places(hmi, ".health", ".list")
+    assert (status.left, status.bottom) == (table.left, table.top)
+    # On a wall screen, too.
+    hmi.resize(1280, 720)
+    hmi.go(query="?kiosk=1")
+    expect(hmi.page.locator(".panels > .health")).to_be_visible()
+    hmi.expect_map()
+    status, map_ = places(hmi, ".health", ".map-panel")
+    assert (status.left, status.bottom) == (map_.left, map_.top)
+    assert map_.right > 0.6 * 1280
+    # A tall one leaves the table what it does not need.
+    hmi.resize(1440, 900)
+    hmi.go()
+    hmi.expect_map()
+    running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
+    hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")

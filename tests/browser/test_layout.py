@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage
 from tests.browser.places import LINES, expect_in_reach, place, places, words_below
-from tests.support.messages import occupancy_grid, scan
+from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
 Size = tuple[int, int]
@@ -210,58 +210,6 @@ def test_a_phone_has_room_for_the_facts_and_missing_data(
     notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")
     assert notice.bottom == pytest.approx(frame.bottom, abs=1)
     assert notice.top > frame.bottom - (frame.bottom - frame.top) / 3
-
-
-def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
-    running: Bridge, open_page: OpenPage
-) -> None:
-    running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
-    hmi = open_page(running.url, viewport={"width": 1440, "height": 900})
-    parts = (".health", ".map-panel", ".list")
-    status, map_, table = places(hmi, *parts)
-    assert (status.left, status.bottom) == (table.left, table.top)
-    narrow = map_.right
-    running.peer.publish_map(occupancy_grid([[0] * 60] * 18))
-    expect(hmi.page.locator(".panels")).to_have_attribute("data-wide", "true")
-    for size in ((1440, 900), (1100, 800)):
-        hmi.resize(*size)
-        status, map_, table = places(hmi, *parts)
-        assert (status.left, status.bottom) == (map_.left, map_.top), size
-        assert (table.left, table.top) == (map_.right, status.top), size
-        expect_in_reach(hmi, ".map-controls button, .legend, tbody tr, .health button")
-        assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
-        assert size != (1440, 900) or map_.right > 1.2 * narrow
-        # In the order of reading for the keyboard, too.
-        expect(hmi.page.locator(".health, .map-panel").first).to_have_class("health")
-    hmi.resize(*UPRIGHT[1])
-    show(hmi, "Map")
-    map_, table = places(hmi, ".map-panel", ".list")
-    assert (map_.left, map_.bottom) == (table.left, table.top - 1)
-    expect_in_reach(hmi, ".map-controls button, .legend, tbody tr")
-    # The tag's card takes the table's place; a phone shows one of the three.
-    hmi.row("1").click()
-    expect(hmi.card("1")).to_be_visible()
-    expect(hmi.page.locator(".list")).to_be_hidden()
-    hmi.turn("")
-    hmi.resize(*SIZES[0])
-    show(hmi, "Tags")
-    expect(hmi.map).to_be_hidden()
-    status, table = places(hmi, ".health", ".list")
-    assert (status.left, status.bottom) == (table.left, table.top)
-    # On a wall screen, too.
-    hmi.resize(1280, 720)
-    hmi.go(query="?kiosk=1")
-    expect(hmi.page.locator(".panels > .health")).to_be_visible()
-    hmi.expect_map()
-    status, map_ = places(hmi, ".health", ".map-panel")
-    assert (status.left, status.bottom) == (map_.left, map_.top)
-    assert map_.right > 0.6 * 1280
-    # A tall one leaves the table what it does not need.
-    hmi.resize(1440, 900)
-    hmi.go()
-    hmi.expect_map()
-    running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
-    hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")
 
 
 def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(

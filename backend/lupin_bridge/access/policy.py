@@ -28,7 +28,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
 from typing import Any, Final, Self
 
 from starlette.datastructures import Headers
@@ -48,12 +48,11 @@ PROXY_USER_KEY: Final = "proxy_user"
 class Proxies:
     """The proxies whose headers count, and the path that the bridge is below ("": none).
 
-    `user_header` is the one in which they name the person ("": none). Whoever reaches a Unix socket
-    is such a proxy.
+    `trusted` are addresses and networks, and `UNIX`: whoever reaches a Unix socket is such a proxy.
+    `user_header` is the one in which they name the person ("": none).
     """
 
-    proxies: tuple[IPv4Network | IPv6Network, ...] = ()
-    has_unix_socket: bool = False
+    trusted: tuple[str, ...] = ()
     path_prefix: str = ""
     user_header: str = ""
 
@@ -77,27 +76,16 @@ class Proxies:
                 "proxy_user_header",
                 f"is {header[:128]!r}, must be a header's name, such as Remote-User",
             )
-        has_unix_socket = unix_path(settings.host) is not None
-        if header and not (settings.trusted_proxy or has_unix_socket):
+        called = settings.called("trusted_proxy")
+        trusted = [_network(text, called) for text in settings.trusted_proxy]
+        if unix_path(settings.host) is not None:
+            trusted.append(UNIX)
+        if header and not trusted:
             raise settings.wrong(
                 "proxy_user_header",
                 "is given without --host unix:PATH or --trusted-proxy: no proxy is trusted",
             )
-        called = settings.called("trusted_proxy")
-        proxies = tuple(_network(text, called) for text in settings.trusted_proxy)
-        return cls(proxies, has_unix_socket, prefix, header)
-
-    @property
-    def trusted(self) -> list[str]:
-        """The proxies as uvicorn's middleware takes them."""
-        return [*map(str, self.proxies), *([UNIX] if self.has_unix_socket else [])]
-
-    def trusts(self, peer: str) -> bool:
-        """Whether this is a proxy whose headers count."""
-        ip = _address(peer)
-        if ip is None:
-            return self.has_unix_socket and peer == UNIX
-        return any(ip in network for network in self.proxies)
+        return cls(tuple(trusted), prefix, header)
 
 
 class BehindProxies:
@@ -108,7 +96,7 @@ class BehindProxies:
     """
 
     def __init__(self, app: ASGIApp, proxies: Proxies) -> None:
-        self._app: Any = ProxyHeadersMiddleware(app, proxies.trusted)  # type: ignore[arg-type]
+        self._app: Any = ProxyHeadersMiddleware(app, [*proxies.trusted])  # type: ignore[arg-type]
         self._proxies = proxies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -118,7 +106,7 @@ class BehindProxies:
             # spelling of a socket that listens for IPv6.
             peer = (scope.get("client") or ("", 0))[0]
             peer = str(_address(peer) or peer) or UNIX
-            user = self._user(scope) if self._proxies.trusts(peer) else {}
+            user = self._user(scope) if peer in self._app.trusted_hosts else {}
             scope = {**scope, "client": (peer, 0), **user, **self._path(scope)}
         await self._app(scope, receive, send)
 
@@ -147,9 +135,9 @@ def path_of(scope: Scope) -> str:
     return path[len(scope.get("root_path", "")) :]
 
 
-def _network(text: str, called: str) -> IPv4Network | IPv6Network:
+def _network(text: str, called: str) -> str:
     try:
-        return ip_network(text.strip("[]"))
+        return str(ip_network(text.strip("[]")))
     except ValueError:
         raise SettingError(
             f"{called} is {text[:128]!r}, must be an address or a network, such as 10.0.0.7 or "

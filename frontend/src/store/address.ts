@@ -40,6 +40,7 @@ export function toFragment(view: Linked): string {
   }
   if (view.heat !== DEFAULT_VIEW.heat) parts.set('heat', view.heat);
   if (view.colouring !== DEFAULT_VIEW.colouring) parts.set('colour', view.colouring);
+  if (view.kept?.sensor === view.sensor) parts.set('range', `${view.kept.low},${view.kept.high}`);
   const layers = layersText(view.layers);
   if (layers !== layersText(DEFAULT_LAYERS)) parts.set('layers', layers);
   const { column, descending } = view.sort;
@@ -59,6 +60,7 @@ export function fromFragment(fragment: string): Linked {
   const layers = parts.get('layers')?.split(',');
   const sensor = parts.get('sensor') || DEFAULT_VIEW.sensor;
   const [moment] = numbers(parts.get('at'), 1) ?? [];
+  const [low = 0, high = 0] = numbers(parts.get('range'), 2) ?? [];
   return {
     moment: moment === undefined || moment < 0 ? null : roundedMoment(moment),
     period: periodOf(parts.get('period')),
@@ -69,6 +71,7 @@ export function fromFragment(fragment: string): Linked {
     camera: cameraOf(numbers(parts.get('view'), 3)),
     heat: HEATS.find((kind) => kind === parts.get('heat')) ?? DEFAULT_VIEW.heat,
     colouring: parts.get('colour') === 'value' ? 'value' : 'ideal',
+    kept: low < high ? { sensor, low, high } : null,
     layers: layers ? new Set(LAYERS.filter((layer) => layers.includes(layer))) : DEFAULT_LAYERS,
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),

@@ -125,9 +125,10 @@ const rangeOfReadings = memoLast((tags: readonly Tag[], sensor: string): Range |
   rangeOf(tags.map((tag) => tag.readings.get(sensor))),
 );
 
-/** The colour range by value: that of field or readings, with the ideal. */
+/** The colour range by value: the kept one, else that of field or readings, with the ideal. */
 export function selectRange(state: AppState): Range | null {
   const { view } = state;
+  if (view.kept?.sensor === view.sensor) return view.kept;
   const { field, held } = selectShown(state);
   const isMapped = field.value?.sensor === view.sensor && field.value.sampleCount > 0;
   const readings = rangeOfReadings(selectTags(state), view.sensor);

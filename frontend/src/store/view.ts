@@ -1,5 +1,6 @@
 import type { Verdict } from '../contract/types';
 import type { Compare } from '../domain/difference';
+import type { Range } from '../domain/ramp';
 import type { Period } from '../domain/time';
 import type { Camera } from '../geometry/coordinates';
 import { type Change, changed } from './create';
@@ -60,6 +61,8 @@ export interface ViewState {
   readonly chartedFrom: ViewState['pane'] | null;
   /** Whether colours show values against their ideal range, or how high they are. */
   readonly colouring: 'ideal' | 'value';
+  /** A sensor's colour range that stays, so that moments can be compared; null: it follows the values. */
+  readonly kept: (Range & { readonly sensor: string }) | null;
   /** null: everything, also when the map grows. */
   readonly camera: Camera | null;
   readonly sort: Sort;
@@ -87,6 +90,7 @@ export const DEFAULT_VIEW: ViewState = {
   chart: null,
   chartedFrom: null,
   colouring: 'ideal',
+  kept: null,
   camera: null,
   // The worst first.
   sort: { column: 'health', descending: true },

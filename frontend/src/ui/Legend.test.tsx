@@ -77,6 +77,18 @@ describe('legend', () => {
     expect(screen.queryByTestId('legend-old')).toBeNull();
   });
 
+  test('a kept range stays while the values change', () => {
+    render(<Legend kiosk={false} />);
+    const keep = screen.getByRole('checkbox', { name: 'Keep this range' });
+    fireEvent.click(keep);
+    flush(() => {
+      showField(fieldWith([[40]], { valueMin: 2, valueMax: 50 }));
+    });
+    expect([at('range-low'), at('range-high')]).toEqual(['12.0', '30.0\u00a0°C']);
+    fireEvent.click(keep);
+    expect([at('range-low'), at('range-high')]).toEqual(['0.0', '50.0\u00a0°C']);
+  });
+
   test('a field of another sensor does not count', () => {
     act({ sensor: 'humidity' });
     render(<Legend kiosk={false} />);

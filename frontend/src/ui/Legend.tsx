@@ -17,7 +17,7 @@ import {
 import { selectHasSnapshot, selectShown, selectTags } from '../store/moment';
 import { HEATS } from '../store/view';
 import { S } from '../strings';
-import { Segmented, Select } from '../widgets/controls';
+import { Check, Segmented, Select } from '../widgets/controls';
 import { ErrorScale, EstimateFacts } from './lazyParts';
 import { WithParts } from './loadDeferred';
 import { SensorLabel } from './SensorPicker';
@@ -38,6 +38,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const isCompared = useApp((state) => state.view.compare !== null);
   const isIdealChosen = useApp((state) => state.view.colouring === 'ideal');
   const hasIdeal = useApp(selectHasIdeal);
+  const isKept = useApp((state) => state.view.kept?.sensor === name);
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const isEstimate = useApp((state) => state.view.heat !== 'nearest');
   const isError = useApp((state) => selectHeat(state)?.isError ?? false);
@@ -96,7 +97,18 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
         <summary>{S.legendMore}</summary>
         <div className="legend-facts">
           {!kiosk && !isError && !isCompared && (
-            <div className="legend-controls">{hasIdeal && <ColouringControl />}</div>
+            <div className="legend-controls">
+              {hasIdeal && <ColouringControl />}
+              {!isIdeal && range && (
+                <Check
+                  label={S.rangeKeep}
+                  isOn={isKept}
+                  onChange={(isOn) => {
+                    act({ kept: isOn ? { ...range, sensor: name } : null });
+                  }}
+                />
+              )}
+            </div>
           )}
           <span data-testid="sample-count">
             {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}

@@ -70,6 +70,7 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'kein Sensor',
   pinFailed: 'Sensor ausgefallen',
   pinPest: 'Schädlinge gefunden',
+  rangeKeep: 'Bereich beibehalten',
   fieldFailed: (reason) =>
     `Die Heatmap konnte nicht geladen werden (${reason}); die Seite versucht es weiter.`,
 

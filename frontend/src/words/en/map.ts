@@ -66,6 +66,7 @@ export const MAP = {
   pinLacking: 'no sensor',
   pinFailed: 'sensor failed',
   pinPest: 'pest seen',
+  rangeKeep: 'Keep this range',
   fieldFailed: (reason: string): string =>
     `The heat map could not be loaded (${reason}); the page keeps trying.`,
 

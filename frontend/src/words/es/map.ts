@@ -68,6 +68,7 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'sin sensor',
   pinFailed: 'sensor averiado',
   pinPest: 'plaga detectada',
+  rangeKeep: 'Mantener el rango',
   fieldFailed: (reason) =>
     `No se pudo cargar el mapa de calor (${reason}); la página lo sigue intentando.`,
 

@@ -68,6 +68,7 @@ export const MAP: In<typeof EN.MAP> = {
   pinLacking: 'geen sensor',
   pinFailed: 'sensor uitgevallen',
   pinPest: 'plaag gezien',
+  rangeKeep: 'Bereik vasthouden',
   fieldFailed: (reason) =>
     `De heatmap kon niet worden geladen (${reason}); de pagina blijft het proberen.`,
 

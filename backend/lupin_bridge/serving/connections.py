@@ -5,7 +5,8 @@ limit. Out of descriptors, it logs an error for each entry in its backlog, and r
 second later: 97 MB of log in half a minute.
 
 A connection that has requested nothing yet, or does not take what it requested, is evicted before
-any new one is refused, the longest waiting first.
+any new one is refused. The client with the most connections loses its own first, the longest
+waiting first: a flood evicts only itself.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import socket
 import ssl
 import struct
 from asyncio.sslproto import SSLProtocol
+from collections import Counter
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,6 +27,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, Protocol
 
+from lupin_bridge.serving.admission import client_key
 from lupin_twin.core.drops import Throttle
 
 log = logging.getLogger(__name__)
@@ -97,7 +100,9 @@ class SmallReads(asyncio.BufferedProtocol):
 
 
 class Evictable(Protocol):
-    """A connection, or a handshake of TLS."""
+    """A connection, or a handshake of TLS; `client` as in an ASGI scope."""
+
+    client: tuple[str, int] | None
 
     @property
     def waiting_since_s(self) -> float | None:
@@ -134,6 +139,7 @@ def room_for_connections() -> int:
 class _Handshake:
     """A connection that has no protocol yet: TLS is being agreed on."""
 
+    client: tuple[str, int] | None
     waiting_since_s: float | None
     task: asyncio.Task[None] | None = None
 
@@ -202,7 +208,7 @@ class Acceptor:
             return
         for _ in range(AT_ONCE):
             try:
-                connection, _ = self._listener.accept()
+                connection, peer = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
@@ -211,15 +217,16 @@ class Acceptor:
                 self._pause()
                 return
             connection.setblocking(False)
-            self._admit(connection)
+            self._admit(connection, peer)
             if self._is_full():
                 return  # evict only when another connection is known to wait
 
     def _is_full(self) -> bool:
         return len(self._connections) + len(self._handshakes) >= self._room
 
-    def _admit(self, connection: socket.socket) -> None:
-        handshake = _Handshake(self._loop.time())
+    def _admit(self, connection: socket.socket, peer: Any) -> None:
+        # A Unix socket's peer is a text.
+        handshake = _Handshake(peer[:2] if isinstance(peer, tuple) else None, self._loop.time())
         self._handshakes.add(handshake)
         handshake.task = self._loop.create_task(self._handshake(connection))
         handshake.task.add_done_callback(lambda _: self._handshakes.discard(handshake))
@@ -232,10 +239,16 @@ class Acceptor:
 
     def _make_room(self) -> bool:
         all_open: list[Evictable] = [*self._connections, *self._handshakes]
-        waiting = [(it.waiting_since_s, it) for it in all_open if it.waiting_since_s is not None]
+        clients = [client_key(it.client[0]) if it.client else "" for it in all_open]
+        sizes = Counter(clients)
+        waiting = [
+            (-sizes[client], it.waiting_since_s, it)
+            for client, it in zip(clients, all_open, strict=True)
+            if it.waiting_since_s is not None
+        ]
         most = max(1, int(self._room * EVICTED_SHARE))
-        chosen = heapq.nsmallest(most, waiting, key=itemgetter(0))
-        for _, connection in chosen:
+        chosen = heapq.nsmallest(most, waiting, key=itemgetter(0, 1))
+        for *_, connection in chosen:
             connection.abort()
         self._warn(
             "%d connections are open, and there are files for %d: evicted the %d that have "

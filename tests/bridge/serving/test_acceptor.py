@@ -80,6 +80,18 @@ def test_an_idle_connection_is_evicted_for_an_active_one(live: Served, message: 
         live.process.wait_for_output("evicted the ")
 
 
+def test_one_address_evicts_only_its_own_connections(live: Served) -> None:
+    with ExitStack() as stack:
+        quiet = stack.enter_context(raw_http.connect(live.url, "127.0.7.1"))
+        quiet.sendall(GET[:-2])
+        others = [
+            stack.enter_context(raw_http.connect(live.url, "127.0.7.2")) for _ in range(2 * STUCK)
+        ]
+        assert others[0].recv(1) == b"", "it made room for the last of its own"
+        quiet.sendall(GET[-2:])
+        assert raw_http.status(raw_http.received(quiet)) == 200
+
+
 def test_websockets_leave_room_for_requests_and_stay(live: Served) -> None:
     with ExitStack() as stack:
         line = live.process.wait_for_output("--max-clients is 5000")
@@ -119,6 +131,7 @@ async def test_no_connection_is_evicted_before_another_one_comes() -> None:
     room = 3
 
     class Waiting(asyncio.Protocol):
+        client = None
         waiting_since_s = 0.0
 
         def connection_made(self, transport: asyncio.BaseTransport) -> None:

@@ -100,9 +100,11 @@ class SmallReads(asyncio.BufferedProtocol):
 
 
 class Evictable(Protocol):
-    """A connection, or a handshake of TLS; `client` as in an ASGI scope."""
+    """A connection, or a handshake of TLS."""
 
-    client: tuple[str, int] | None
+    @property
+    def client(self) -> tuple[str, int] | None:
+        """Address and port, as in an ASGI scope."""
 
     @property
     def waiting_since_s(self) -> float | None:

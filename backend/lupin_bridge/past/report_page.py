@@ -206,7 +206,12 @@ class PageText:
         value = max(values, key=lambda it: abs(it - (limit or 0.0)), default=None)
         worst = self._number(value, sensor, limit)
         ends = [it["cleared_at"] for it in own if it["cleared_at"]]
-        lasted_s = [it["cleared_at"]["sec"] - it["raised_at"]["sec"] for it in mine if ends]
+        lasted_s = last_s = 0
+        for from_s, to_s in sorted(
+            (it["raised_at"]["sec"], it["cleared_at"]["sec"]) for it in own if ends
+        ):
+            lasted_s += max(0, to_s - max(from_s, last_s))
+            last_s = max(to_s, last_s)
         cause, times = self._cause([entry]), f"{len(mine)}×" if len(mine) > 1 else ""
         worst = f"{worst} ({verdict})" if worst else verdict
         if (heading or cause) != self._what(reason):
@@ -217,7 +222,7 @@ class PageText:
             "point": entry["tag_id"] or self.say("house"),
             "when": self._clock(min((it["raised_at"] for it in own), key=itemgetter("sec"))),
             "end": self._clock(max(ends, key=itemgetter("sec"))) if ends else "",
-            "length": self._length(sum(lasted_s)) if ends else "",
+            "length": self._length(lasted_s) if ends else "",
             "worst": worst,
             "who": "; ".join(dict.fromkeys(filter(None, map(self._who, own)))),
         }

@@ -32,6 +32,10 @@ test('shows each sensor that exists for as long as was wished', () => {
   stop = startCycle({ seconds: 30, refused: null });
   pass(29.9);
   expect(inView()).toBe('temperature');
+  act({ moment: 500 });
+  pass(30);
+  act({ moment: null });
+  expect(inView()).toBe('temperature');
   const seen = [0, 1, 2].map(() => {
     pass(30);
     return inView();

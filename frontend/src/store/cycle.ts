@@ -40,6 +40,8 @@ export function startCycle({ seconds }: CycleSetting): () => void {
   if (seconds === null) return () => undefined;
   const timer = setInterval(() => {
     const state = store.get();
+    // Nothing changes below somebody who looks back.
+    if (state.view.moment !== null) return;
     const sensors = sensorsOf(selectTags(state), selectSensors(state));
     const next = sensorAfter(sensors, state.view.sensor);
     if (next) act({ sensor: next.name });

@@ -262,7 +262,12 @@ def test_what_came_several_times_is_one_row_and_so_is_damp_air_by_several_sensor
         alarm(reason=damp, worst=96.0, raised_at=at(300)),
         alarm(reason=dense, worst=0.1, acknowledged_by="Anna", acknowledged_at=at(120)),
     ]
+    air += [
+        alarm(tag_id="8", reason=reason, raised_at=at(from_s), cleared_at=at(to_s))
+        for reason, from_s, to_s in ((damp, 60, 1800), (dense, 1200, 10_800))
+    ]
     page = page_of(alarms=[*air, *hot])
     assert "Temperature too high 2× 7 06:01 08:30 40 min 31.0 °C (stressed)" in page
     assert "Air too damp 7 06:01 Humidity 96.0 % (stressed) acknow" in page
+    assert "Air too damp 8 06:01 09:00 2 h 59 min" in page  # not those of one sensor alone
     assert "Vapour" not in page

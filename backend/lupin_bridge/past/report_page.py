@@ -26,12 +26,10 @@ from lupin_bridge.serving.admission import content_answer
 from lupin_bridge.stream.state_json import by_cause, cause_of
 from lupin_twin.core.diagnostics import Origin
 
-HTML_TYPE: Final = "text/html; charset=utf-8"
 _POLICY: Final = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src 'self'; font-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Decimal comma and thousands point, in all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 _EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
@@ -73,19 +71,9 @@ class ReportPage(Report):
     def plan(self, body: dict[str, Any]) -> Plan:
         """See `Report`."""
         page = PageText(self.lang, self.criteria, self.zone).page(body, self.origin, self.site)
-        headers = {**self._headers(), **PAGE_HEADERS}
-        return of_content(content_answer(page.encode("utf-8", "replace"), HTML_TYPE, headers))
-
-
-def _head(lang: str, title: str, period: str = "") -> str:
-    name = f"{title}, {period}" if period else title
-    return (
-        f'<!doctype html><html lang="{lang}"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width">'
-        '<link rel="icon" href="../lupin.svg">'
-        f"<title>{escape(name)}</title><style>{_file('report.css')}</style></head><body>"
-        f'<h1><img src="../lupin.svg" alt=""> {escape(title)}</h1>'
-    )
+        written = page.encode("utf-8", "replace")
+        headers = {**self._headers(), "Content-Security-Policy": _POLICY}
+        return of_content(content_answer(written, "text/html; charset=utf-8", headers))
 
 
 class PageText:
@@ -118,7 +106,12 @@ class PageText:
         if body["kept_from"] == body["to"]:
             known = [say("nothing_kept")]
         parts = [
-            _head(self._lang, heading, period),
+            f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width">',
+            '<link rel="icon" href="../lupin.svg">',
+            f"<title>{escape(f'{heading}, {period}')}</title>",
+            f"<style>{_file('report.css')}</style></head><body>",
+            f'<h1><img src="../lupin.svg" alt=""> {escape(heading)}</h1>',
             f"<p><strong>{escape(hint)}</strong></p>" if hint else "",
             f"<p>{escape(period)}. ",
             f"{escape(say('zone', zone=self._zone_name(body['from'], body['to'])))}</p>",

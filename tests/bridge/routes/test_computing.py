@@ -150,7 +150,6 @@ async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Hel
         for task in leaving:
             task.cancel()
         await until(lambda: fields_at(workers) == (0, 1), "the others' end")
-        assert workers.abandoned == 5
         held.gate.set()
         assert (await staying).status_code == 200
         # A freed thread may have started another one before that was cancelled too.
@@ -168,7 +167,6 @@ async def test_a_time_out_cancels_the_work_too(
         assert "3 s" in answers[0].json()["detail"]
         workers = it.bridge.source.workers
         await until(lambda: fields_at(workers) == (0, 0), "the end of it all")
-        assert workers.abandoned == 4
         assert it.bridge.admission.being_computed == 0
         # Notes that were never read, and a log that hangs.
         monkeypatch.setattr(type(it.bridge.notes), "notes", None)

@@ -62,7 +62,7 @@ class Job(Future[ResultT], Generic[ResultT]):
 
     def cancel(self) -> bool:
         """Abandon the job: remove it from the queue or, if it runs, let it end soon."""
-        if not self.done() and not self._is_abandoned:
+        if not self.done():
             self._is_abandoned = True
             self._on_cancel(self)
         return super().cancel()
@@ -94,7 +94,6 @@ class Workers:
         large_threads: int = LARGE_THREADS,
         small_threads: int = SMALL_THREADS,
     ) -> None:
-        self.abandoned = 0
         self._name = name
         self._clock = clock
         self._only_small = [False] * large_threads + [True] * small_threads
@@ -142,7 +141,6 @@ class Workers:
 
     def _forget(self, job: Job[ResultT]) -> None:
         with self._changed:
-            self.abandoned += 1
             if job in self._waiting:
                 self._waiting.remove(job)  # type: ignore[arg-type]
 

@@ -14,20 +14,18 @@ const CHOICES = ['none', 'day', 'week'] as const;
 export function CompareControl(): JSX.Element {
   const compare = useApp((state) => state.view.compare);
   return (
-    <div className="compare">
-      <label className="layer-choice">
-        <span>{S.compare}</span>
-        <Select
-          value={compare ?? 'none'}
-          data-testid="compare"
-          options={CHOICES}
-          text={(choice) => S.compareWith[choice]}
-          onChange={(choice) => {
-            act({ compare: choice === 'none' ? null : choice });
-          }}
-        />
-      </label>
-    </div>
+    <label className="compare layer-choice">
+      <span>{S.compare}</span>
+      <Select
+        value={compare ?? 'none'}
+        data-testid="compare"
+        options={CHOICES}
+        text={(choice) => S.compareWith[choice]}
+        onChange={(choice) => {
+          act({ compare: choice === 'none' ? null : choice });
+        }}
+      />
+    </label>
   );
 }
 

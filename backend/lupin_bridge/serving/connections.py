@@ -253,8 +253,8 @@ class Acceptor:
         for *_, connection in chosen:
             connection.abort()
         self._warn(
-            "%d connections are open, and there are files for %d: evicted the %d that have "
-            "waited longest",
+            "%d connections are open, and there are files for %d: evicted the %d longest waiting "
+            "of the largest clients",
             len(all_open),
             self._room,
             len(chosen),

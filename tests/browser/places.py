@@ -85,4 +85,4 @@ def expect_in_reach(hmi: Hmi, selector: str) -> None:
 
     with suppress(AssertionError):
         hmi.expect(is_in_reach, "all in reach")
-    assert missed == []
+    assert missed == [], missed

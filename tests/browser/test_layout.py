@@ -328,6 +328,15 @@ def test_many_sensors_leave_the_reasons_their_room(running: Bridge, open_page: O
     # They have two lines: the status is its shape, and a word for screen readers.
     word = cell.locator(".health-mark > span")
     hmi.expect(lambda: word.evaluate("e => e.clientWidth") == 1, "no word")
+    # Beside a narrow table's chosen sensor, too, which is in sight although the table is wider.
+    hmi.resize(1024, 768)
+    hmi.turn("sensor=sensor4")
+    hmi.expect(lambda: cell.evaluate("e => e.clientWidth") > 120, "room for the reasons")
+    running.peer.observe(scan("2", {"temperature": 45.0}, at=(1, 0)))
+    why = hmi.row("2").locator(".why", has_text="Temperature")
+    hmi.expect(lambda: why.evaluate(LINES) == 2, "a value and its limit on one line")
+    assert place(hmi.page.locator("thead .chosen")).right <= 1024
+    assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) > 0
 
 
 # Elements beyond the window, or beyond their own box, that are no scrollable list. Of a column's

@@ -73,7 +73,7 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     phone.row("2").tap()
     assert heights(".card")[0] >= tall
     # Its age and its ideal range share a line.
-    assert heights(".card-readings li:has(.card-ideal)")[0] < 84
+    assert heights(".card-readings li:has(.card-ideal)")[0] < 66
     phone.page.get_by_role("navigation").get_by_role("button", name="Map").tap()
     expect(phone.map).to_be_visible()
     frame, card = heights(".map-frame", ".card")

@@ -95,7 +95,7 @@ def test_the_robot_and_its_trail_plan_and_battery_are_shown_in_the_live_view(
     place(robot, 3.2, 1.5, math.pi / 2)
     hmi = open_page(robot.url)
     fact = hmi.test_id("robot-fact")
-    expect(fact).to_have_text(re.compile(r"Robot: 3\.2 m, 1\.5 m; \d+\ss ago; battery 64\s%"))
+    expect(fact).to_have_text(re.compile(r"Robot: x 3\.2 m, y 1\.5 m; \d+\ss ago; battery 64\s%"))
     layer = hmi.test_id("robot")
     place(robot, 3.2, 1.6, math.pi / 2)
     expect(layer).to_have_attribute("data-freshness", "live")

@@ -291,6 +291,7 @@ class PageText:
         )
         rows = ""
         for heading, entries in groups.items():
+            rows += "<tbody>"
             if heading:
                 rows += f'<tr><th colspan="{len(columns)}">{escape(heading)}</th></tr>'
             for entry in entries:
@@ -299,10 +300,8 @@ class PageText:
                 for cell, kind in zip(cells(entry), kinds, strict=True):
                     rows += f"<td{kind}>{escape(cell)}</td>"
                 rows += "</tr>"
-        return (
-            f'{head}<table class="{name}"><thead><tr>{names}</tr></thead>'
-            f"<tbody>{rows}</tbody></table>"
-        )
+            rows += "</tbody>"
+        return f'{head}<table class="{name}"><thead><tr>{names}</tr></thead>{rows}</table>'
 
     def _more(self, body: Entry, name: str) -> str:
         count = body["left_out"][name]

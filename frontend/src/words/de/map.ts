@@ -91,7 +91,7 @@ export const MAP: In<typeof EN.MAP> = {
   differenceSince: (moment) => `gegenüber ${moment}`,
 
   robotLayer: 'Roboter',
-  robotAt: (x, y) => `Roboter: ${x} m, ${y} m`,
+  robotAt: (x, y) => `Roboter: x ${x} m, y ${y} m`,
   robotNowhere: 'Roboter: Position unbekannt',
   robotAgeUnknown: 'Alter unbekannt',
   robotBattery: (percent) => `Akku ${percent}`,

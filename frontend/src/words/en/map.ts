@@ -87,7 +87,7 @@ export const MAP = {
   differenceSince: (moment: string): string => `since ${moment}`,
 
   robotLayer: 'Robot',
-  robotAt: (x: string, y: string): string => `Robot: ${x} m, ${y} m`,
+  robotAt: (x: string, y: string): string => `Robot: x ${x} m, y ${y} m`,
   robotNowhere: 'Robot: position unknown',
   robotAgeUnknown: 'age unknown',
   robotBattery: (percent: string): string => `battery ${percent}`,

@@ -89,7 +89,7 @@ export const MAP: In<typeof EN.MAP> = {
   differenceSince: (moment) => `respecto a ${moment}`,
 
   robotLayer: 'Robot',
-  robotAt: (x, y) => `Robot: ${x} m, ${y} m`,
+  robotAt: (x, y) => `Robot: x ${x} m, y ${y} m`,
   robotNowhere: 'Robot: posición desconocida',
   robotAgeUnknown: 'antigüedad desconocida',
   robotBattery: (percent) => `batería ${percent}`,

@@ -89,7 +89,7 @@ export const MAP: In<typeof EN.MAP> = {
   differenceSince: (moment) => `ten opzichte van ${moment}`,
 
   robotLayer: 'Robot',
-  robotAt: (x, y) => `Robot: ${x} m, ${y} m`,
+  robotAt: (x, y) => `Robot: x ${x} m, y ${y} m`,
   robotNowhere: 'Robot: positie onbekend',
   robotAgeUnknown: 'tijd onbekend',
   robotBattery: (percent) => `accu ${percent}`,

@@ -24,7 +24,9 @@ test('the robot’s position and battery in words, each with its age', () => {
   const said = (now: number | null): string => robotText(robot, now).replaceAll('\u00a0', ' ');
   expect(said(1_000)).toBe('Robot: x 2.1 m, y −3.4 m; 12 s ago; battery 64 %');
   expect(said(1_180)).toBe('Robot: x 2.1 m, y −3.4 m; 3 min ago; battery 64 %, reported 3 min ago');
-  expect(said(null)).toBe('Robot: x 2.1 m, y −3.4 m; age unknown; battery 64 %, reported age unknown');
+  expect(said(null)).toBe(
+    'Robot: x 2.1 m, y −3.4 m; age unknown; battery 64 %, reported age unknown',
+  );
   expect(robotText({ ...robot, position: null }, 981)).toMatch(/^Robot: position unknown; battery/);
 });
 

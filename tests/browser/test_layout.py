@@ -190,6 +190,11 @@ def test_a_small_laptop_has_status_map_and_table_at_first_glance(
     assert map_.bottom - map_.top > 400
     for tag_id in TAGS:
         expect(hmi.row(tag_id)).to_be_in_viewport(ratio=1)
+    hmi.go("", "?lang=es")
+    hmi.page.locator("input[value=alarms]").check(force=True)
+    bar = hmi.page.locator(".alarm-bar")
+    expect(bar).to_be_visible()
+    hmi.expect(lambda: bar.evaluate("e => e.clientHeight") < 70, "one line of controls")
 
 
 def test_a_phone_has_room_for_the_facts_and_missing_data(

@@ -23,6 +23,7 @@ from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.field import listed
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
+    ApiRoute,
     computed,
     error_response,
     json_response,
@@ -36,7 +37,7 @@ from lupin_bridge.routes.answers import (
 from lupin_bridge.serving.admission import REVALIDATE
 from lupin_bridge.stream import routes_schema
 
-router = APIRouter()
+router = APIRouter(route_class=ApiRoute)
 # In the application only where the page was not built.
 no_page_router = APIRouter()
 

@@ -72,15 +72,15 @@ def test_the_oldest_export_is_ended_for_another_client_and_frees_one_place() -> 
         begin("e", LONG_EXPORT_S)
         assert ended == ["a"]
         assert admission.refused == {"client_exports": 1, "total_exports": 1}
-        assert admission.exporting == EXPORTS
-    assert admission.exporting == 0
+        assert len(admission.exports) == EXPORTS
+    assert len(admission.exports) == 0
     admission = Admission(Limits())
     with ExitStack() as taken, ExitStack() as broken_off:
         for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
-            now_s = LONG_EXPORT_S * admission.exporting
+            now_s = LONG_EXPORT_S * len(admission.exports)
             stack.enter_context(admission.export(client, now_s, lambda: None))
         broken_off.close()
-        assert admission.exporting == EXPORTS
+        assert len(admission.exports) == EXPORTS
 
 
 def test_a_client_has_a_rate_and_a_request_refused_for_its_number_uses_no_turn() -> None:

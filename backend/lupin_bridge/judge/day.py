@@ -87,6 +87,18 @@ def says_day(light_lx: float | None) -> bool | None:
     return light_lx >= DAY_FROM_LX
 
 
+def light_after(
+    said: bool | None, light_ns: int, stamp_ns: int, light_lx: float | None
+) -> tuple[bool | None, int]:
+    """What a tag's light sensor says after one more scan, and the stamp of its last reading.
+
+    Before, it said `said`, by a reading of `light_ns`. `light_lx` None: the scan left it out.
+    """
+    if light_lx is not None:
+        return says_day(light_lx), stamp_ns
+    return None if stamp_ns - light_ns > LEFT_OUT_NS else said, light_ns
+
+
 def nights_by_light(
     readings: Iterable[tuple[int, float]], end_ns: int
 ) -> Sequence[tuple[int, int]] | None:

@@ -136,15 +136,6 @@ class Light:
         return 2 * self._bright >= len(self._is_bright) if self._is_bright else None
 
 
-def judge_day(light: bool | None, clock: ClockDay | None, now_s: float | None) -> Day:
-    """Decide by the light; if that is None, by the clock at `now_s` (Unix time)."""
-    if light is not None:
-        return Day(light, "light")
-    if clock is not None and now_s is not None:
-        return Day(clock.is_day(now_s), "clock")
-    return Day(True, "assumed")
-
-
 # From a moment on (ns of ROS time), a tag's light sensor says day, night, or nothing.
 Turn = tuple[int, bool | None]
 

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Final
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day, judge_day
+from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.judge.scans import (
     SHORTEST_NS,
@@ -71,8 +71,11 @@ class Criteria:
         return holds_ns(interval_ns(scans_ns))
 
     def day(self, light: bool | None, stamp_ns: int) -> Day:
-        """Whether it was day at a moment of ROS time; `light` is what the light said, or None."""
-        return judge_day(light, self.clock, unix_s(stamp_ns))
+        """Whether it was day at a moment of ROS time: by the light; if that is None, the clock."""
+        if light is not None:
+            return Day(light, "light")
+        now_s = unix_s(stamp_ns)
+        return Day(True, "assumed") if now_s is None else Day(self.clock.is_day(now_s), "clock")
 
     def is_day(self, stamp_ns: int) -> bool:
         """Whether it was day by the clock alone."""

@@ -246,7 +246,9 @@ class AlarmFeed:
         return is_all
 
     async def _publish(self) -> None:
-        alarm_log, fold, now_ns = self._log, self._log.fold, self._now_ns()
+        alarm_log, fold, now_ns, seen = self._log, self._log.fold, self._now_ns(), self._seen
+        if seen is not None and seen.clock == "doubted":
+            now_ns = seen.stamp_ns  # alarms of the log stand; what is unknown is how old they are
         if fold is None or now_ns is None:
             await self._publish_silence(0.0)
             return

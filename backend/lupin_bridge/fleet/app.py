@@ -42,7 +42,6 @@ from lupin_bridge.fleet.overview import (
     SitesFrame,
     alarms_json,
     archive_json,
-    map_svg,
     map_version,
     site_json,
 )
@@ -326,7 +325,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         if has_etag(request, tag):
             return not_modified(tag)
         headers = {"ETag": tag, **REVALIDATE, "Content-Security-Policy": _PICTURE_POLICY}
-        return Response(map_svg(site.dots), 200, headers, "image/svg+xml")
+        return Response(site.dots, 200, headers, "image/svg+xml")
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:

@@ -107,7 +107,7 @@ export function useSince({ tagId, reasons, isAcknowledged }: Urgent): string | n
   if (!oldest) return isKnown && isAwaited(reasons[0]) ? S.alarmNotYet : null;
   if (isAcknowledged) return S.healthAcknowledged;
   const state = store.get();
-  return sinceText(oldest, rosNow(state, now()), selectKnownSince(state), false);
+  return sinceText(oldest, rosNow(state, now()), selectKnownSince(state));
 }
 
 /**
@@ -158,12 +158,11 @@ export function DoNow({
               <button
                 type="button"
                 className="do-more"
-                data-short={S.attentionMore(rest)}
                 onClick={() => {
                   act(withList('tags'));
                 }}
               >
-                <span>{restText(rest)}</span>
+                {S.attentionMore(rest)}
               </button>
             )}
           </li>
@@ -185,8 +184,6 @@ export function restOf(all: readonly Urgent[], shownOnes: readonly Urgent[]): nu
   const hidden = new Set(all.filter((each) => !isShown.has(each)).map(({ tagId }) => tagId));
   return [...hidden].filter((id) => !named.has(id)).length || hidden.size;
 }
-
-export const restText = (tags: number): string => `+ ${S.shownOf(tags, tags)}`;
 
 /** Grouped by task, the most severe tag first; acknowledged ones form groups of their own. */
 const byTodo = (urgent: readonly Urgent[]) => [

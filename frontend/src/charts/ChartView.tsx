@@ -23,8 +23,6 @@ import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Least height of each chart of a tag, and of the one chart of a sensor, without the times; CSS pixels. */
 const LEAST_HEIGHT = { tag: 80, sensor: 152 } as const;
-/** The same where the charts scroll: all of them together are out of sight anyway. */
-const SCROLLED_HEIGHT = 120;
 /** Height of a chart's title, CSS pixels. */
 const AROUND = 32;
 
@@ -63,7 +61,13 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];
   const scrolls = room - AROUND < least;
-  const height = scrolls ? Math.max(least, SCROLLED_HEIGHT) : Math.floor(room) - AROUND;
+  // Whole charts, and the title of the next one as a sign that more follow.
+  const around = AROUND + TIMES_HEIGHT;
+  const visible = size.height - AROUND;
+  const whole = Math.floor(visible / (least + around)) || 1;
+  const height = scrolls
+    ? Math.max(least, Math.floor(visible / whole) - around)
+    : Math.floor(room) - AROUND;
 
   const zoom = (factor: number) => (): void => {
     const nowS = rosNow(store.get(), now());

@@ -18,8 +18,8 @@ import { S } from '../strings';
 import { Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
-import { type PlotHandlers, usePlot } from './plot';
-import { type FetchedLines, useSensorsOf } from './useLines';
+import { type PlotHandlers, pointOn, usePlot } from './plot';
+import { type Charts, useSensorsOf } from './useCharts';
 import { zoomTo } from './zoom';
 import { DAY_S } from '../domain/difference';
 
@@ -52,7 +52,7 @@ export function PlotView({
 
   const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
   useEffect(() => {
-    plot.current?.point(ofBar);
+    pointOn(plot.current, ofBar);
   }, [plot, ofBar]);
 
   return (
@@ -179,11 +179,11 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
 }
 
 export function ChartState({
-  fetched: { state, message, span },
+  charts: { state, message, span },
   hasLines,
   lacks,
 }: {
-  fetched: FetchedLines;
+  charts: Charts;
   hasLines: boolean;
   /** What has no data to chart; null: there is some. */
   lacks: string | null;

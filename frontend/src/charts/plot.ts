@@ -237,8 +237,9 @@ export function usePlot(
   return plot;
 }
 
-/** Marks a time, ROS seconds, as the mouse would, but without an event; null: none. */
+/** Marks a time, ROS seconds, unless the mouse does; without an event. Null: none. */
 export function pointOn(chart: uPlot | null, at: number | null): void {
+  if (chart?.over.matches(':hover')) return;
   const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
   chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
 }

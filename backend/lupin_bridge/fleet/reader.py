@@ -147,7 +147,8 @@ def _newer_map(log: SiteLog, known: int) -> tuple[int, OccupancyMap | None]:
 class ArchiveRecall(Recall):
     """Queries the archive, each query in a transaction, over pooled connections."""
 
-    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+    def answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        """See `Recall`."""
         try:
             connection = self._connection()
             try:

@@ -404,7 +404,8 @@ class WatchChild(Child):
 
 
 class _WithoutJournal(Recall):
-    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+    def answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        """See `Recall`."""
         return query(None, is_abandoned)
 
 

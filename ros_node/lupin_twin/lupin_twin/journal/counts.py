@@ -373,10 +373,10 @@ class Buckets:
         self.add(index, 1, value, value, value)
 
     def past(self) -> SeriesPast:
-        """The answer, rounded to 12 digits: these are the same in SQLite and PostgreSQL."""
+        """The answer; its means have 12 digits: these are the same in SQLite and PostgreSQL."""
         steps = self.grid
         rows = [
-            (steps.start_ns + index * steps.bucket_ns, n, *map(_rounded, (total / n, low, high)))
+            (steps.start_ns + index * steps.bucket_ns, n, float(f"{total / n:.12g}"), low, high)
             for index, (n, total, low, high) in sorted(self._found.items())
         ]
         return SeriesPast(steps.start_ns, steps.end_ns, steps.bucket_ns, *zip(*rows, strict=True))
@@ -387,10 +387,6 @@ def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int)
     values = tuple(value for _, value in found)
     stamps = tuple(stamp_ns for stamp_ns, _ in found)
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
-
-
-def _rounded(number: float) -> float:
-    return float(f"{number:.12g}")
 
 
 def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:

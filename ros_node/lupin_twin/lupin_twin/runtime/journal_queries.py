@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -28,7 +29,6 @@ MAX_S: Final = 60.0
 _STEPS: Final = 20_000
 # How long `close` waits, s, for running queries: the WAL is removed with the last connection.
 _END_S: Final = 1.0
-_CACHE_KB: Final = 8_000
 # Where, or when, to ask while the file is not ours to read.
 _ELSEWHERE: Final = {
     JournalState.IN_USE: "ask that twin",
@@ -77,7 +77,7 @@ class Recall:
         search raises; cancel it when nobody waits any more.
         """
         try:
-            return self._workers.submit(lambda stop: self._answer(search, stop), cost_s)
+            return self._workers.submit(partial(self.answer, search), cost_s)
         except RuntimeError:
             refused: Future[AnswerT] = Future()
             refused.set_exception(NotRemembered("the twin is ending"))
@@ -93,9 +93,10 @@ class Recall:
         for opened in idle:
             opened.connection.close()
 
-    # --- in a thread of the workers -----------------------------------------------------------
+    # --- in a thread of the workers, or of the caller's ---------------------------------------
 
-    def _answer(self, search: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+    def answer(self, search: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        """Run `search` in this thread, until `is_abandoned()`; raises as the future of `query`."""
         until_s = time.monotonic() + self._max_s
 
         def should_stop() -> bool:
@@ -156,9 +157,7 @@ class Recall:
             if opened.files == files:
                 return opened
             opened.connection.close()
-        connection = open_reader(path)
-        connection.execute(f"PRAGMA cache_size = -{_CACHE_KB}")
-        return _Open(connection, files)
+        return _Open(open_reader(path), files)
 
     def _put_back(self, opened: _Open | None, *, is_sound: bool) -> None:
         with self._changed:

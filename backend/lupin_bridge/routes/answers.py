@@ -26,7 +26,7 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
-from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, StateQuery, answered
+from lupin_bridge.past.plans import PLAN_TAG_S, Answered, Query, StateQuery, answered
 from lupin_bridge.query_string import NoParameters, matches, parameters_of, read
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
@@ -198,7 +198,7 @@ def error_response(
 
 
 REFUSALS: Final = (
-    *(AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError),
+    *(AdmissionError, NotRemembered, PastRefused, TwinUnavailableError),
     *(Refused, NotesUnwritable),
 )
 
@@ -221,7 +221,7 @@ def refusal(error: Exception) -> Response:
     match error:
         case AdmissionError():
             status, headers = (503 if isinstance(error, BusyError) else 429), error.headers
-        case NotFound() | NoSuchTag():
+        case NotFound():
             status = 404
         case Refused():
             status, headers = error.status, error.headers

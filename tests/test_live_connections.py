@@ -9,7 +9,7 @@ from itertools import cycle
 import orjson
 import pytest
 
-from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES, MAX_INCOMPLETE_BYTES
+from lupin_bridge.serving.connections import MAX_HEAD_BYTES, MAX_INCOMPLETE_BYTES
 from tests.support import raw_http
 from tests.support.access import TOKEN, Served, served
 from tests.support.proc_stat import cpu_s, open_files, peak_mb, reset_peak, resident_mb

@@ -21,7 +21,7 @@ from tests.support.ws_client import open_websocket
 
 Frame = dict[str, Any]
 
-# Every HTTP route for GET, from the copy of the OpenAPI document that is in git; and that itself. Two
+# Every HTTP route for GET, from the copy of the OpenAPI document in git; and that itself. Two
 # routes exist only where there are accounts.
 _DOCUMENT = json.loads((ROOT / "frontend" / "openapi.json").read_text(encoding="utf-8"))
 _READ = [path for path, it in _DOCUMENT["paths"].items() if "get" in it]

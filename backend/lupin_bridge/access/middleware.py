@@ -39,8 +39,7 @@ from lupin_bridge.access.policy import (
     path_of,
 )
 from lupin_bridge.serving.admission import RateLimit, client_key
-from lupin_bridge.serving.connections import CONNECTION_KEY
-from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.connections import CONNECTION_KEY, HttpConnection
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import SettingError, Settings
 

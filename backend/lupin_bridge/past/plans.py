@@ -34,6 +34,7 @@ from lupin_twin.core.past import (
     MAX_POINTS,
     MAX_READINGS,
     Event,
+    NotFound,
     PastRefused,
     SeriesPast,
     SeriesRequest,
@@ -58,16 +59,12 @@ _WRITE_SCAN_S: Final = 20e-6
 _WRITE_ENTRY_S: Final = 5e-6
 
 
-class NoSuchTag(LookupError):
-    """The tag was not known then."""
-
-
 def tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
-    """One tag of a snapshot; raises `NoSuchTag` if it is not known."""
+    """One tag of a snapshot; raises `NotFound` if it is not known."""
     for tag in snapshot.tags:
         if tag.tag_id == tag_id:
             return tag
-    raise NoSuchTag(f"no tag {tag_id[:64]!r} is known ({len(snapshot.tags)} others are)")
+    raise NotFound(f"no tag {tag_id[:64]!r} is known ({len(snapshot.tags)} others are)")
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,7 @@ from lupin_bridge.access.middleware import PERSON_KEY, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import bodies
-from lupin_bridge.past.fields import Field
-from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, StateQuery, answered
+from lupin_bridge.past.plans import Answered, Query, StateQuery, answered
 from lupin_bridge.query_string import NoParameters, matches, parameters_of, read
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
@@ -78,10 +77,7 @@ RouteT = TypeVar("RouteT", bound=Callable[..., Any])
 
 
 class ApiRoute(APIRoute):
-    """A route below `/api/` refuses parameters of the query, but for those that it describes.
-
-    A route with some parses them itself, by `query_string.read`. Pages and probes ignore all.
-    """
+    """Refuses all parameters below `/api/`, unless it describes some, and parses them itself."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """See `APIRoute`."""
@@ -105,13 +101,11 @@ def read_route(
     """
     if query is not None:
         documentation["openapi_extra"] = {"parameters": parameters_of(query)}
-    own = documentation.get("openapi_extra")
 
     def register(function: RouteT) -> RouteT:
         router.get(path, response_class=Response, **documentation)(function)
-        router.head(path, response_class=Response, include_in_schema=False, openapi_extra=own)(
-            function
-        )
+        hidden: dict[str, Any] = {**documentation, "responses": None, "include_in_schema": False}
+        router.head(path, response_class=Response, **hidden)(function)
         return function
 
     return register
@@ -198,7 +192,7 @@ def error_response(
 
 
 REFUSALS: Final = (
-    *(AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError),
+    *(AdmissionError, NotRemembered, PastRefused, TwinUnavailableError),
     *(Refused, NotesUnwritable),
 )
 
@@ -221,7 +215,7 @@ def refusal(error: Exception) -> Response:
     match error:
         case AdmissionError():
             status, headers = (503 if isinstance(error, BusyError) else 429), error.headers
-        case NotFound() | NoSuchTag():
+        case NotFound():
             status = 404
         case Refused():
             status, headers = error.status, error.headers
@@ -397,29 +391,6 @@ async def computed(
 
 
 # --- answers of the past --------------------------------------------------------------------------
-
-
-async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> Answer:
-    """A field of the newest state, which is computed in this process, and cached.
-
-    Raises:
-        AdmissionError: past a limit of the client that was the first to request it.
-        TwinUnavailableError: there is no state.
-        lupin_twin.field.engine.FieldRefused: a bad request.
-
-    """
-    snapshot = newest_of(bridge)
-    cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
-    with (
-        bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times,
-        bridge.metrics.field_seconds.time(),
-    ):
-        occupancy = bridge.source.occupancy_map()
-        answer = await on_worker(
-            bridge, lambda stop: field.plan(snapshot, etag, occupancy).write(stop), cost_s * times
-        )
-    bridge.cache.put(etag, answer)
-    return answer
 
 
 async def respond_as_of(request: Request, query: StateQuery) -> Response:

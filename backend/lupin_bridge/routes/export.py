@@ -34,8 +34,7 @@ from lupin_bridge.routes.answers import (
     within_time,
 )
 from lupin_bridge.serving.admission import Admission, Limits
-from lupin_bridge.serving.connections import CONNECTION_KEY
-from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.connections import CONNECTION_KEY, HttpConnection
 from lupin_twin.core.past import NotRemembered, PastRefused, PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers

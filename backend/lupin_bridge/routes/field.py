@@ -14,9 +14,11 @@ from pydantic import BaseModel
 from lupin_bridge import field as formats
 from lupin_bridge import query_string
 from lupin_bridge.access.middleware import client_of
+from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.past.fields import Estimated, Field, Reports
+from lupin_bridge.past.plans import PLAN_TAG_S
 from lupin_bridge.query_string import AT, Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
@@ -25,8 +27,8 @@ from lupin_bridge.routes.answers import (
     bridge_of,
     json_response,
     list_header,
-    newest_field,
     newest_of,
+    on_worker,
     read_route,
     refusal,
     refusing,
@@ -34,11 +36,12 @@ from lupin_bridge.routes.answers import (
     respond_as_of,
     respond_past,
 )
-from lupin_bridge.serving.admission import ClientLimitError
+from lupin_bridge.serving.admission import Answer, ClientLimitError
 from lupin_bridge.stream import pollers, routes_schema, schema
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report
+from lupin_twin.runtime.workers import SMALL_S
 
 router = APIRouter(route_class=ApiRoute)
 
@@ -142,6 +145,29 @@ daily quantity, which is made from the log.""",
     parameters=parameters_of(FieldQuery),
     model=schema.GetFieldResponse,
 )
+
+
+async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> Answer:
+    """A field of the newest state, which is computed in this process, and cached.
+
+    Raises:
+        AdmissionError: past a limit of the client that was the first to request it.
+        TwinUnavailableError: there is no state.
+        lupin_twin.field.engine.FieldRefused: a bad request.
+
+    """
+    snapshot = newest_of(bridge)
+    cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
+    with (
+        bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times,
+        bridge.metrics.field_seconds.time(),
+    ):
+        occupancy = bridge.source.occupancy_map()
+        answer = await on_worker(
+            bridge, lambda stop: field.plan(snapshot, etag, occupancy).write(stop), cost_s * times
+        )
+    bridge.cache.put(etag, answer)
+    return answer
 
 
 async def _answer(request: Request, field_format: FieldFormat | None) -> Response:

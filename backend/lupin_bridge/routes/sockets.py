@@ -31,7 +31,8 @@ from lupin_bridge.feed.relay import NotRelayedError, Sample
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
-from lupin_bridge.routes.answers import error_response, newest_field
+from lupin_bridge.routes.answers import error_response
+from lupin_bridge.routes.field import newest_field
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.connections import CONNECTION_KEY
 from lupin_bridge.serving.ws_protocol import BINARY, Connection, frame_head

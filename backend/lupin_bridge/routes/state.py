@@ -17,7 +17,6 @@ from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import (
     History,
     LatestOfTag,
-    NoSuchTag,
     OneTag,
     Timeline,
     WholeState,
@@ -44,7 +43,7 @@ from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
-from lupin_twin.core.past import EVERY_TAG, SeriesRequest
+from lupin_twin.core.past import EVERY_TAG, NotFound, SeriesRequest
 
 # Longest reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
@@ -153,7 +152,7 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     bridge = bridge_of(request)
     try:
         return await respond_as_of(request, OneTag(at_ns, tag_id, bridge.criteria.sensors))
-    except NoSuchTag as error:
+    except NotFound as error:
         journal = bridge.source.journal()
         response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
         response.headers.update(bodies.moment_headers(journal, at_ns))

@@ -22,8 +22,13 @@ from fastapi import FastAPI
 from uvicorn.server import HANDLED_SIGNALS
 
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.connections import Acceptor, room_for_connections, tear_down
-from lupin_bridge.serving.http_protocol import MAX_INCOMPLETE_BYTES, HttpConnection
+from lupin_bridge.serving.connections import (
+    MAX_INCOMPLETE_BYTES,
+    Acceptor,
+    HttpConnection,
+    room_for_connections,
+    tear_down,
+)
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import UNIX, SettingError, Settings, unix_path
 from lupin_twin.runtime import process

@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS, Access
-from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
+from lupin_bridge.serving.connections import MAX_HEAD_BYTES
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream import schema
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served

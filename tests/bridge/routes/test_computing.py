@@ -18,7 +18,7 @@ from lupin_bridge.routes import status, writes
 from lupin_bridge.routes.answers import PIECE_BYTES
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.connections import HttpConnection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.notes import Note, withdrawals

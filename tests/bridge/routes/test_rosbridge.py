@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.routes import sockets
-from lupin_bridge.routes.answers import newest_field
+from lupin_bridge.routes.field import newest_field
 from lupin_bridge.routes.sockets import MAX_OPEN_CALLS
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.stream.frames import StateFrame

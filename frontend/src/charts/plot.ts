@@ -147,11 +147,7 @@ function build(
         },
       ],
       hooks: {
-        drawAxes: [
-          (self) => {
-            drawBelow(frameOf(self));
-          },
-        ],
+        drawAxes: [(self) => drawBelow(frameOf(self))],
         draw: [
           (self) => {
             const frame = frameOf(self);
@@ -217,9 +213,7 @@ export function usePlot(
     plot.current = chart;
     // At once: a printer does not wait.
     const stop = onLook(() => {
-      chart.batch(() => {
-        chart.redraw();
-      });
+      chart.batch(() => chart.redraw());
     });
     return () => {
       plot.current = null;

@@ -143,15 +143,7 @@ export function RobotFact(): JSX.Element | null {
 
 export function RobotChoice(): JSX.Element {
   const isOn = useApp((state) => state.view.layers.has('robot'));
-  return (
-    <Check
-      label={S.robotLayer}
-      isOn={isOn}
-      onChange={(on) => {
-        act(withLayer('robot', on));
-      }}
-    />
-  );
+  return <Check label={S.robotLayer} isOn={isOn} onChange={(on) => act(withLayer('robot', on))} />;
 }
 
 const NOTHING: RobotNow = { position: null, plan: null, battery: null };
@@ -178,9 +170,7 @@ function useTrail(): readonly TrailPoint[] {
     const stop = keepFetched<Robot>(
       {
         paceMs: PACE_MS,
-        onValue: (robot) => {
-          setTrail(robot.trail.map(trailPoint));
-        },
+        onValue: (robot) => setTrail(robot.trail.map(trailPoint)),
       },
       ({ twin }) =>
         twin.connection.socket.kind === 'open'

@@ -61,10 +61,8 @@ export const C = NOTES[LANGUAGE];
 
 /** The tag of a note's subject; null: the greenhouse, or an alarm unknown to the page. */
 function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
-  const [kind, id] = [
-    subject.slice(0, subject.indexOf(':')),
-    subject.slice(subject.indexOf(':') + 1),
-  ];
+  const [kind, ...rest] = subject.split(':');
+  const id = rest.join(':');
   if (kind === 'tag') return id;
   if (kind !== 'alarm') return null;
   return alarms.find((alarm) => alarm.id === id)?.tag_id || null;

@@ -158,8 +158,9 @@ function build(
         ],
         setCursor: [
           (self) => {
-            const { left } = self.cursor;
-            handlers.onPoint(left === undefined || left < 0 ? null : self.posToVal(left, 'x'));
+            // Also called for new data, when the mouse may be elsewhere.
+            if (!self.over.matches(':hover')) return;
+            handlers.onPoint(self.posToVal(self.cursor.left ?? 0, 'x'));
           },
         ],
         setSelect: [
@@ -178,6 +179,7 @@ function build(
     aligned(latest.current),
     element,
   );
+  chart.over.addEventListener('mouseleave', () => handlers.onPoint(null));
   chart.over.addEventListener('click', (event) => {
     handlers.onPick?.(chart.posToVal(event.offsetX, 'x'));
   });

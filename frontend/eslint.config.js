@@ -28,6 +28,8 @@ export default tseslint.config(
         // An empty string is no name, no filter and no message: `||` is meant.
         { ignorePrimitives: { string: true } },
       ],
+      // A handler of one call needs no braces.
+      '@typescript-eslint/no-confusing-void-expression': ['error', { ignoreArrowShorthand: true }],
       'max-lines': ['error', { max: 400 }],
       'no-console': 'error',
     },

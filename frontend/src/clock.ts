@@ -64,6 +64,4 @@ export const timeOfDay = (): number => Date.now();
 export const timeZone = (): string => new Intl.DateTimeFormat().resolvedOptions().timeZone;
 
 export const pause = (ms: number): Promise<void> =>
-  new Promise((resolve) => {
-    setTimeout(resolve, ms);
-  });
+  new Promise((resolve) => setTimeout(resolve, ms));

@@ -37,9 +37,7 @@ const storage = openStorage();
 prefer(readSettings(storage));
 onChange(
   ({ settings }) => [settings],
-  () => {
-    keepSettings(storage, store.get().settings);
-  },
+  () => keepSettings(storage, store.get().settings),
 );
 
 const kiosk = new URLSearchParams(window.location.search).has('kiosk');

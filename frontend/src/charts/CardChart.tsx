@@ -28,16 +28,12 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
       <SensorChoice
         tagId={tagId}
         value={sensor}
-        onChange={(name) => {
-          chosenSensor.set({ name, inView });
-        }}
+        onChange={(name) => chosenSensor.set({ name, inView })}
       />
       <button
         type="button"
         className="text-button"
-        onClick={() => {
-          act(withChart({ by: 'tag', tagIds: [tagId] }));
-        }}
+        onClick={() => act(withChart({ by: 'tag', tagIds: [tagId] }))}
       >
         <Icon name="chart" size={16} />
         {S.charts}

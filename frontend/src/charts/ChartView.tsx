@@ -94,9 +94,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             value={tagId}
             options={offered}
             text={tagLabel}
-            onChange={(next) => {
-              act(withTag(next));
-            }}
+            onChange={(next) => act(withTag(next))}
           />
         )}
         <button
@@ -115,9 +113,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             icon="later"
             label={S.chartDayBefore}
             aria-pressed={hasDayBefore}
-            onClick={() => {
-              prefer({ dayBefore: !hasDayBefore });
-            }}
+            onClick={() => prefer({ dayBefore: !hasDayBefore })}
           />
           <IconButton data-zoom icon="plus" label={S.zoomIn} onClick={zoom(0.5)} />
           <IconButton data-zoom icon="minus" label={S.zoomOut} onClick={zoom(2)} />
@@ -125,16 +121,12 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
           <IconButton
             icon={isTable ? 'chart' : 'list'}
             label={isTable ? S.chartPlots : S.chartTable}
-            onClick={() => {
-              setTable(!isTable);
-            }}
+            onClick={() => setTable(!isTable)}
           />
           <button
             type="button"
             className="text-button chart-close"
-            onClick={() => {
-              act(withChart(null));
-            }}
+            onClick={() => act(withChart(null))}
           >
             <Icon name="close" />
             {S.cardClose}
@@ -192,17 +184,13 @@ function TagChoice({
   const others = tags.filter(
     ({ id, readings }) => isHad(sensor, (name) => readings.has(name)) && !tagIds.includes(id),
   );
-  const choose = (next: readonly string[]): void => {
-    act(withChart({ by: 'sensor', tagIds: next }));
-  };
+  const choose = (next: readonly string[]): void => act(withChart({ by: 'sensor', tagIds: next }));
   return (
     <div className="chart-tags">
       <SensorChoice
         tagId={tagIds[0] ?? ''}
         value={sensor.name}
-        onChange={(name) => {
-          act({ sensor: name });
-        }}
+        onChange={(name) => act({ sensor: name })}
       />
       <ul aria-label={S.tags}>
         {tagIds.map((tagId, look) => (
@@ -222,9 +210,7 @@ function TagChoice({
                 type="button"
                 className="chip-close"
                 aria-label={S.chartRemoveTag(shown(tagId, 24))}
-                onClick={() => {
-                  choose(tagIds.filter((each) => each !== tagId));
-                }}
+                onClick={() => choose(tagIds.filter((each) => each !== tagId))}
               >
                 <Icon name="close" size={14} />
               </button>
@@ -236,9 +222,7 @@ function TagChoice({
         <select
           aria-label={S.chartAddTag}
           value=""
-          onChange={(event) => {
-            choose([...tagIds, event.target.value]);
-          }}
+          onChange={(event) => choose([...tagIds, event.target.value])}
         >
           <option value="" disabled>
             {S.chartAddTag}

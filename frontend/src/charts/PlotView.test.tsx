@@ -3,6 +3,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import { readingAt, type Series } from '../domain/series';
 import { act, receive, store } from '../store/app';
+import { pointedTime } from '../store/create';
 import { NOTHING } from '../store/fetcher';
 import { showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
@@ -52,6 +53,25 @@ test.each([
   render(<PlotView model={model} height={100} />);
   expect(screen.getByTestId('plot').getAttribute('aria-label')).toMatch(words);
 });
+
+test('a time pointed at on the bar stays while the chart goes on', async () => {
+  vi.stubGlobal('ResizeObserver', Laid);
+  const model = plainModel('temperature', [lineOf(seriesWith({}))]);
+  const { rerender, unmount } = render(<PlotView model={model} height={100} />);
+  flush(() => pointedTime.set(95_000));
+  rerender(<PlotView model={{ ...model, span: { from: 91_000, to: 101_000 } }} height={100} />);
+  await flush(() => Promise.resolve());
+  expect(document.querySelector('.u-over')).not.toBeNull();
+  expect(pointedTime.get()).toBe(95_000);
+  unmount();
+});
+
+/** Stub ResizeObserver: a chart has a size. */
+class Laid {
+  constructor(private readonly callback: (entries: readonly object[]) => void) {}
+  observe = (): void => this.callback([{ contentRect: { width: 1_000, height: 100 } }]);
+  disconnect = (): void => undefined;
+}
 
 test('the numbers of an axis are exact, however small its steps are', () => {
   expect([-0.0004, 0.00015, 0.1 + 0.2, 12_500].map(axisText)).toEqual([

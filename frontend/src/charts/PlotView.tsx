@@ -25,9 +25,7 @@ import { DAY_S } from '../domain/difference';
 
 const HANDLERS: PlotHandlers = {
   onPoint: pointedTime.set,
-  onPick: (moment) => {
-    act({ moment });
-  },
+  onPick: (moment) => act({ moment }),
   onZoom: zoomTo,
 };
 
@@ -49,9 +47,7 @@ export function PlotView({
   const only = isAlone ? model.lines[0] : undefined;
 
   const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
-  useEffect(() => {
-    pointOn(plot.current, pointed);
-  }, [plot, pointed]);
+  useEffect(() => pointOn(plot.current, pointed), [plot, pointed, model]);
 
   return (
     <section

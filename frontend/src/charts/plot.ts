@@ -147,11 +147,7 @@ function build(
         },
       ],
       hooks: {
-        drawAxes: [
-          (self) => {
-            drawBelow(frameOf(self));
-          },
-        ],
+        drawAxes: [(self) => drawBelow(frameOf(self))],
         draw: [
           (self) => {
             const frame = frameOf(self);
@@ -162,8 +158,9 @@ function build(
         ],
         setCursor: [
           (self) => {
-            const { left } = self.cursor;
-            handlers.onPoint(left === undefined || left < 0 ? null : self.posToVal(left, 'x'));
+            // Also called for new data, when the mouse may be elsewhere.
+            if (!self.over.matches(':hover')) return;
+            handlers.onPoint(self.posToVal(self.cursor.left ?? 0, 'x'));
           },
         ],
         setSelect: [
@@ -182,6 +179,7 @@ function build(
     aligned(latest.current),
     element,
   );
+  chart.over.addEventListener('mouseleave', () => handlers.onPoint(null));
   chart.over.addEventListener('click', (event) => {
     handlers.onPick?.(chart.posToVal(event.offsetX, 'x'));
   });
@@ -217,9 +215,7 @@ export function usePlot(
     plot.current = chart;
     // At once: a printer does not wait.
     const stop = onLook(() => {
-      chart.batch(() => {
-        chart.redraw();
-      });
+      chart.batch(() => chart.redraw());
     });
     return () => {
       plot.current = null;

@@ -40,9 +40,7 @@ export function connect(url: string, handlers: ConnectionHandlers) {
     handlers.onConnection(connection);
   };
 
-  const dispatch = (type: Plain): void => {
-    send({ type, now: now() });
-  };
+  const dispatch = (type: Plain): void => send({ type, now: now() });
 
   // Remove the handlers before closing, so that a dropped socket delivers nothing more.
   const drop = (): void => {
@@ -95,9 +93,7 @@ export function connect(url: string, handlers: ConnectionHandlers) {
   const wake = (): void => {
     if (document.visibilityState === 'visible') dispatch('wake');
   };
-  const online = (): void => {
-    dispatch('online');
-  };
+  const online = (): void => dispatch('online');
   document.addEventListener('visibilitychange', wake);
   window.addEventListener('online', online);
   window.addEventListener('pageshow', wake);

@@ -70,9 +70,7 @@ export async function saveMap(): Promise<void> {
   context.font = `500 ${FONT}`;
   context.fillText(origin === null ? time : `${S.origin[origin]}, ${time}`, EDGE_PX, 40);
 
-  const blob = await new Promise<Blob | null>((resolve) => {
-    canvas.toBlob(resolve, 'image/png');
-  });
+  const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, 'image/png'));
   if (blob) save(blob, fileName('map', 'png', takenAt, moment));
 }
 

@@ -7,9 +7,7 @@ export function save(blob: Blob, name: string): void {
   link.download = name;
   link.click();
   // By then the download holds its own reference; a minute is enough for a slow start.
-  setTimeout(() => {
-    URL.revokeObjectURL(link.href);
-  }, 60_000);
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
 export const saveCsv = (

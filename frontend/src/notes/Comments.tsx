@@ -36,9 +36,7 @@ export function Comments({
           className="comment-button"
           aria-label={S.alarmWhat(C.comment, name)}
           aria-expanded={isOpen}
-          onClick={() => {
-            setOpen(!isOpen);
-          }}
+          onClick={() => setOpen(!isOpen)}
         >
           {C.comment}
         </button>
@@ -107,9 +105,7 @@ function CommentRow({
           className="text-button"
           aria-label={S.alarmWhat(C.withdraw, shown(text, 40))}
           onClick={() => {
-            withdrawComment(id).catch((error: unknown) => {
-              setFault(C.failed(failureText(error)));
-            });
+            withdrawComment(id).catch((error: unknown) => setFault(C.failed(failureText(error))));
           }}
         >
           {C.withdraw}
@@ -139,9 +135,7 @@ export function CommentField({
   const [fault, setFault] = useState('');
   const [isSending, setSending] = useState(false);
   const field = useRef<HTMLTextAreaElement>(null);
-  useEffect(() => {
-    field.current?.focus();
-  }, []);
+  useEffect(() => field.current?.focus(), []);
   const send = (event: SyntheticEvent): void => {
     event.preventDefault();
     setSending(true);
@@ -164,9 +158,7 @@ export function CommentField({
           maxLength={LONGEST}
           value={text}
           required
-          onChange={(event) => {
-            setText(event.target.value);
-          }}
+          onChange={(event) => setText(event.target.value)}
           onKeyDown={(event) => {
             if (event.key !== 'Escape') return;
             // Handled here: it must not close the tag card too.

@@ -34,9 +34,7 @@ export const startNotes = (): (() => void) =>
   keepFetched<readonly Note[]>(
     {
       paceMs: PACE_MS,
-      onValue: (notes) => {
-        standingNotes.set(standing(notes));
-      },
+      onValue: (notes) => standingNotes.set(standing(notes)),
     },
     ({ twin: { alarms, connection } }) =>
       // A journal without notes needs no request.
@@ -63,10 +61,8 @@ export const C = NOTES[LANGUAGE];
 
 /** The tag of a note's subject; null: the greenhouse, or an alarm unknown to the page. */
 function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
-  const [kind, id] = [
-    subject.slice(0, subject.indexOf(':')),
-    subject.slice(subject.indexOf(':') + 1),
-  ];
+  const [kind, ...rest] = subject.split(':');
+  const id = rest.join(':');
   if (kind === 'tag') return id;
   if (kind !== 'alarm') return null;
   return alarms.find((alarm) => alarm.id === id)?.tag_id || null;
@@ -126,12 +122,7 @@ export function NoteMarks({
         ));
         return (
           <li key={found[0]?.id} style={{ left: `${100 * share}%` }}>
-            <button
-              type="button"
-              onClick={() => {
-                act({ moment: at });
-              }}
-            >
+            <button type="button" onClick={() => act({ moment: at })}>
               <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
                 <path d="M2 2h12v9H8l-4 4v-4H2z" />
               </svg>

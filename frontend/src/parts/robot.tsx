@@ -131,15 +131,7 @@ export function RobotFact(): JSX.Element | null {
 
 export function RobotChoice(): JSX.Element {
   const isOn = useApp((state) => state.view.layers.has('robot'));
-  return (
-    <Check
-      label={S.robotLayer}
-      isOn={isOn}
-      onChange={(on) => {
-        act(withLayer('robot', on));
-      }}
-    />
-  );
+  return <Check label={S.robotLayer} isOn={isOn} onChange={(on) => act(withLayer('robot', on))} />;
 }
 
 const NOTHING: RobotNow = { position: null, plan: null, battery: null };

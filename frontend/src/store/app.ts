@@ -23,9 +23,7 @@ export const store = createStore({
   settings: DEFAULT_SETTINGS,
 });
 
-const put = (part: Partial<AppState>): void => {
-  store.set(changed(store.get(), part));
-};
+const put = (part: Partial<AppState>): void => store.set(changed(store.get(), part));
 
 export const act = (change: Change<ViewState>): void => {
   put({ view: viewAfter(store.get().view, change) });

@@ -84,7 +84,5 @@ export const marksOnMap = createStore<readonly Box[]>([]);
 /** Keeps labels off these marks until the returned function is called. */
 export function keepClear(marks: readonly Box[]): () => void {
   marksOnMap.set([...marksOnMap.get(), ...marks]);
-  return () => {
-    marksOnMap.set(marksOnMap.get().filter((each) => !marks.includes(each)));
-  };
+  return () => marksOnMap.set(marksOnMap.get().filter((each) => !marks.includes(each)));
 }

@@ -46,7 +46,5 @@ export function startCycle({ seconds }: CycleSetting): () => void {
     const next = sensorAfter(sensors, state.view.sensor);
     if (next) act({ sensor: next.name });
   }, seconds * 1000);
-  return () => {
-    clearInterval(timer);
-  };
+  return () => clearInterval(timer);
 }

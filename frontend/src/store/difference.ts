@@ -31,12 +31,8 @@ export function startDifference(): () => void {
       paceMs: DRAG_PACE_MS,
       everyMs: TICK_MS,
       isDragged: true,
-      onValue: (value) => {
-        receive({ difference: ready(value) });
-      },
-      onError: (message) => {
-        receive({ difference: failed(message) });
-      },
+      onValue: (value) => receive({ difference: ready(value) }),
+      onError: (message) => receive({ difference: failed(message) }),
     },
     (state) => {
       const { compare, sensor } = state.view;

@@ -190,9 +190,7 @@ export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetche
   const [fetcher] = useState(() =>
     createFetcher<T>({
       paceMs,
-      onValue: (value) => {
-        setFetched(ready(value));
-      },
+      onValue: (value) => setFetched(ready(value)),
       onError: (message) => {
         // A value of another group does not answer this one.
         setFetched(({ value, state }) => failed(message, state === 'waiting' ? null : value));
@@ -204,14 +202,7 @@ export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetche
     setFetched(({ value }) => ({ value, state: 'waiting', message: '' }));
   }
   // An unchanged task has no effect.
-  useEffect(() => {
-    fetcher.want(task);
-  });
-  useEffect(
-    () => () => {
-      fetcher.want(null);
-    },
-    [fetcher],
-  );
+  useEffect(() => fetcher.want(task));
+  useEffect(() => () => fetcher.want(null), [fetcher]);
   return fetched;
 }

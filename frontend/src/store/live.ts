@@ -58,15 +58,11 @@ export function startLive(): () => void {
   const reportBad = (why: string): void => {
     receive(withUnread(why));
     clearTimeout(forget);
-    forget = setTimeout(() => {
-      receive({ unread: null });
-    }, REPORT_MS);
+    forget = setTimeout(() => receive({ unread: null }), REPORT_MS);
   };
 
   const link = connect(stateSocketUrl(), {
-    onConnection: (connection) => {
-      receive(withConnection(connection, now()));
-    },
+    onConnection: (connection) => receive(withConnection(connection, now())),
     onRefused: () => void signInIfRequired(),
     onBad: reportBad,
     onFrame: (frame, connection) => {

@@ -28,9 +28,7 @@ export function startLoaders(): () => void {
       {
         paceMs: FIELD_INTERVAL_MS,
         everyMs: ESTIMATE_TICK_MS,
-        onValue: (value) => {
-          receive(withField(ready(value)));
-        },
+        onValue: (value) => receive(withField(ready(value))),
         onError: (message) => {
           receive(withField(failed(message, selectLatest(store.get()).field.value)));
         },
@@ -40,9 +38,7 @@ export function startLoaders(): () => void {
     keepFetched<MapPicture>(
       {
         paceMs: MAP_INTERVAL_MS,
-        onValue: (value) => {
-          receive(withLatest({ map: ready(value) }));
-        },
+        onValue: (value) => receive(withLatest({ map: ready(value) })),
         onError: (message) => {
           receive(withLatest({ map: failed(message, selectLatest(store.get()).map.value) }));
         },
@@ -81,12 +77,8 @@ export const startQuality = (): (() => void) =>
   keepFetched<FieldQuality>(
     {
       paceMs: QUALITY_INTERVAL_MS,
-      onValue: (quality) => {
-        receive(withQuality(quality));
-      },
-      onError: () => {
-        receive(withQuality(null));
-      },
+      onValue: (quality) => receive(withQuality(quality)),
+      onError: () => receive(withQuality(null)),
     },
     qualityTask,
   );

@@ -24,9 +24,7 @@ export function startPast(): () => void {
     clearTimeout(patience);
     receive(withPast(past));
   };
-  const showNothing = (at: number): void => {
-    show({ at, house: NO_HOUSE });
-  };
+  const showNothing = (at: number): void => show({ at, house: NO_HOUSE });
   const losePatience = (): void => {
     const { moment } = store.get().view;
     if (moment !== null) showNothing(moment);

@@ -46,9 +46,7 @@ export function startRemembered(): () => void {
         state.twin.connection.epoch,
         selectLatest(state).snapshot === null,
       ],
-      onValue: (value) => {
-        receive({ remembered: ready(value) });
-      },
+      onValue: (value) => receive({ remembered: ready(value) }),
       onError: (message) => {
         receive({ remembered: failed(message, store.get().twin.remembered.value) });
       },

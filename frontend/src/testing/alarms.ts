@@ -27,6 +27,4 @@ export const alarms = (list: readonly Alarm[], over: Partial<Alarms> = {}): Alar
   ...over,
 });
 
-export const reportAlarms = (...list: readonly Alarm[]): void => {
-  receive({ alarms: alarms(list) });
-};
+export const reportAlarms = (...list: readonly Alarm[]): void => receive({ alarms: alarms(list) });

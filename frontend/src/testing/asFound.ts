@@ -31,9 +31,7 @@ function listenersEnd(target: EventTarget): () => void {
   const { addEventListener } = target;
   target.addEventListener = (...given: Parameters<EventTarget['addEventListener']>) => {
     addEventListener.apply(target, given);
-    stops.push(() => {
-      target.removeEventListener(given[0], given[1], given[2]);
-    });
+    stops.push(() => target.removeEventListener(given[0], given[1], given[2]));
   };
   return () => {
     target.addEventListener = addEventListener;

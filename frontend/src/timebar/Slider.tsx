@@ -54,9 +54,7 @@ export function Slider({
 
   const at = (event: PointerEvent): number =>
     event.clientX - (element.current?.getBoundingClientRect().left ?? 0);
-  const go = (next: number | null): void => {
-    act({ moment: next });
-  };
+  const go = (next: number | null): void => act({ moment: next });
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0) return;
     pause();

@@ -185,9 +185,7 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
         placeholder={isSimulated ? 'hh:mm:ss' : undefined}
         value={typed[name]}
         aria-invalid={!isPeriod}
-        onChange={(event) => {
-          take({ ...typed, [name]: event.target.value });
-        }}
+        onChange={(event) => take({ ...typed, [name]: event.target.value })}
       />
     </label>
   );

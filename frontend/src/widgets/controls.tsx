@@ -70,9 +70,7 @@ export const Check = ({ label, isOn, onChange, ...rest }: CheckProps): JSX.Eleme
       {...rest}
       type="checkbox"
       checked={isOn}
-      onChange={(event) => {
-        onChange(event.target.checked);
-      }}
+      onChange={(event) => onChange(event.target.checked)}
     />
     <span>{label}</span>
   </label>
@@ -125,9 +123,7 @@ export function Segmented<Value extends string>({
             name={name}
             value={option.value}
             checked={option.value === value}
-            onChange={() => {
-              onChange(option.value);
-            }}
+            onChange={() => onChange(option.value)}
           />
           <span>{option.label}</span>
         </label>

@@ -12,9 +12,7 @@ export function useSize(ref: RefObject<HTMLElement | null>) {
       setSize({ width: Math.floor(width), height: Math.floor(height) });
     });
     observer.observe(element);
-    return () => {
-      observer.disconnect();
-    };
+    return () => observer.disconnect();
   }, [ref]);
   return size;
 }

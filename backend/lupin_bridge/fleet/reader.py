@@ -115,7 +115,7 @@ def latest(known_map: int, frame_id: str, reader: LogReader) -> Reported:
     log = reader.connection
     every = runs(log.execute)
     span = span_at(every, FOREVER_NS)
-    is_wall_clock = span is None or not span.run.begun.is_simulated
+    is_wall_clock = span is None or not span.is_simulated
     (now_ns,) = log.execute(
         "SELECT CAST(extract(epoch FROM now()) * 1000000000 AS BIGINT)"
     ).fetchone()

@@ -118,9 +118,10 @@ class Services:
 
     def __init__(self, twin: Twin, wake: Callable[[], None]) -> None:
         self._twin = twin
-        self._workers = Workers("field")
-        self.fields = JobQueue(self._workers, wake, large_at_once=LARGE_THREADS)
-        self._past = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
+        # Apart, because threads that read the journal may wait for a disk that hangs.
+        self._workers = Workers("field"), Workers("past")
+        self.fields = JobQueue(self._workers[0], wake, large_at_once=LARGE_THREADS)
+        self._past = JobQueue(self._workers[1], wake, lambda: twin.utilities.is_behind)
         self._cache = FieldCache(twin.parameters.field_cache_mb * 1e6)
 
     def offer(self, group: Any) -> None:
@@ -159,7 +160,8 @@ class Services:
 
     def close(self) -> None:
         """End the workers; their current work is abandoned."""
-        self._workers.close()
+        for workers in self._workers:
+            workers.close()
 
     def _answer(
         self,

@@ -51,7 +51,6 @@ from lupin_twin.estimate import engine
 from lupin_twin.estimate.engine import Estimate, EstimateRequest, TagPast, moment_of
 from lupin_twin.field.engine import (
     FieldCache,
-    FieldKey,
     FieldRefused,
     FieldRules,
     check_request,
@@ -192,7 +191,8 @@ class Services:
         check_request(wanted, rules.max_grid_cells)
         is_clipped = occupancy is not None and rules.clip_to_explored
         revision = occupancy.revision if occupancy is not None and is_clipped else None
-        key = FieldKey(wanted, twin.store.observation_count, revision, rules)
+        # The count stands for the store's whole content.
+        key = wanted, twin.store.observation_count, revision, rules
         if (found := self._cache.get(key)) is not None:
             reply(convert_services.field_response(found))
             return None

@@ -18,7 +18,6 @@ from lupin_twin.field import idw
 from lupin_twin.field.engine import (
     MAX_ENTRIES,
     FieldCache,
-    FieldKey,
     FieldRefused,
     FieldRequest,
     FieldRules,
@@ -209,12 +208,6 @@ def test_cells_of_a_default_request_are_doubled_until_there_are_few_enough() -> 
 RULES = FieldRules(2.0, 1.5, 1.5, 1_000, clip_to_explored=False)
 
 
-def key(number: int) -> FieldKey:
-    """A key that differs from any other by its box."""
-    request = FieldRequest("temperature", 1.0, float(number), 0.0, number + 5.0, 5.0)
-    return FieldKey(request, observation_count=3, map_revision=None, rules=RULES)
-
-
 def grid(cells: int) -> FieldGrid:
     """A field of one row: 4 bytes a cell."""
     return compute_idw_field(
@@ -233,33 +226,33 @@ def grid(cells: int) -> FieldGrid:
 def test_64_fields_are_cached_and_the_least_recently_used_goes_first() -> None:
     cache = FieldCache(1e6)
     for number in range(MAX_ENTRIES):
-        cache.put(key(number), grid(1))
-    assert cache.get(key(0)) is not None
-    cache.put(key(100), grid(1))
+        cache.put(number, grid(1))
+    assert cache.get(0) is not None
+    cache.put(100, grid(1))
     assert MAX_ENTRIES == 64
     assert len(cache) == 64
-    assert cache.get(key(0)) is not None
-    assert cache.get(key(1)) is None
-    assert cache.get(key(2)) is not None
+    assert cache.get(0) is not None
+    assert cache.get(1) is None
+    assert cache.get(2) is not None
 
 
 def test_the_total_bytes_are_limited() -> None:
     cache = FieldCache(100)
     for number in range(5):
-        cache.put(key(number), grid(10))
+        cache.put(number, grid(10))
     assert (cache.bytes, len(cache)) == (80, 2)
-    assert cache.get(key(3)) is not None
-    assert cache.get(key(4)) is not None
-    cache.put(key(5), grid(25))
+    assert cache.get(3) is not None
+    assert cache.get(4) is not None
+    cache.put(5, grid(25))
     assert (cache.bytes, len(cache)) == (100, 1)
 
 
 def test_a_field_larger_than_the_cache_is_not_cached_and_evicts_nothing() -> None:
     cache = FieldCache(100)
-    cache.put(key(1), grid(10))
-    cache.put(key(2), grid(26))
-    assert cache.get(key(2)) is None
-    assert cache.get(key(1)) is not None
+    cache.put(1, grid(10))
+    cache.put(2, grid(26))
+    assert cache.get(2) is None
+    assert cache.get(1) is not None
     assert cache.bytes == 40
 
 

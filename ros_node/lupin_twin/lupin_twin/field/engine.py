@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple, Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -109,25 +109,15 @@ class FieldRules:
         )
 
 
-class FieldKey(NamedTuple):
-    """Everything that a field depends on, as the key of the cache.
-
-    `observation_count` stands for the store's whole content. `map_revision` is None if no map clips
-    the field.
-    """
-
-    request: FieldRequest
-    observation_count: int
-    map_revision: int | None
-    rules: FieldRules
-
-
 class FieldCache:
-    """An LRU of at most `MAX_ENTRIES` fields whose values take at most `max_bytes` together."""
+    """An LRU of at most `MAX_ENTRIES` fields whose values take at most `max_bytes` together.
+
+    A key has everything that a field depends on.
+    """
 
     def __init__(self, max_bytes: float) -> None:
         self._max_bytes = max_bytes
-        self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
+        self._grids: OrderedDict[Hashable, FieldGrid] = OrderedDict()
 
     @property
     def bytes(self) -> int:
@@ -137,14 +127,14 @@ class FieldCache:
     def __len__(self) -> int:
         return len(self._grids)
 
-    def get(self, key: FieldKey) -> FieldGrid | None:
+    def get(self, key: Hashable) -> FieldGrid | None:
         """The cached field of `key`, which becomes the most recently used; None: there is none."""
         grid = self._grids.get(key)
         if grid is not None:
             self._grids.move_to_end(key)
         return grid
 
-    def put(self, key: FieldKey, grid: FieldGrid) -> None:
+    def put(self, key: Hashable, grid: FieldGrid) -> None:
         """Cache `grid`, unless it exceeds the limit alone; drops the least recently used ones."""
         if grid.values.nbytes > self._max_bytes:
             return

@@ -51,7 +51,6 @@ from lupin_twin.estimate import engine
 from lupin_twin.estimate.engine import Estimate, EstimateRequest, TagPast, moment_of
 from lupin_twin.field.engine import (
     FieldCache,
-    FieldKey,
     FieldRefused,
     FieldRules,
     check_request,
@@ -118,9 +117,10 @@ class Services:
 
     def __init__(self, twin: Twin, wake: Callable[[], None]) -> None:
         self._twin = twin
-        self._workers = Workers("field")
-        self.fields = JobQueue(self._workers, wake, large_at_once=LARGE_THREADS)
-        self._past = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
+        # Apart, because threads that read the journal may wait for a disk that hangs.
+        self._workers = Workers("field"), Workers("past")
+        self.fields = JobQueue(self._workers[0], wake, large_at_once=LARGE_THREADS)
+        self._past = JobQueue(self._workers[1], wake, lambda: twin.utilities.is_behind)
         self._cache = FieldCache(twin.parameters.field_cache_mb * 1e6)
 
     def offer(self, group: Any) -> None:
@@ -159,7 +159,8 @@ class Services:
 
     def close(self) -> None:
         """End the workers; their current work is abandoned."""
-        self._workers.close()
+        for workers in self._workers:
+            workers.close()
 
     def _answer(
         self,
@@ -190,7 +191,8 @@ class Services:
         check_request(wanted, rules.max_grid_cells)
         is_clipped = occupancy is not None and rules.clip_to_explored
         revision = occupancy.revision if occupancy is not None and is_clipped else None
-        key = FieldKey(wanted, twin.store.observation_count, revision, rules)
+        # The count stands for the store's whole content.
+        key = wanted, twin.store.observation_count, revision, rules
         if (found := self._cache.get(key)) is not None:
             reply(convert_services.field_response(found))
             return None

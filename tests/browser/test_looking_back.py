@@ -16,6 +16,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.browser.hmi import PHONE, Hmi, OpenPage, point, press_at, slider
+from tests.browser.places import places
 from tests.browser.test_accessibility import violations
 from tests.support.journal import SECOND, append, inspection, pin, scan
 from tests.support.messages import scan as observed
@@ -183,6 +184,9 @@ def test_the_end_of_the_bar_is_now_and_before_the_log_is_nothing_and_between_is_
     # What was wrong then is shown; its open actions are not.
     expect(page.test_id("health-driver")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
     expect(page.page.locator(".do-what strong")).to_have_count(0)
+    # Nor is a line kept for them.
+    (todo,) = places(page, ".health .do-now")
+    assert todo.bottom - todo.top < 40
     page.turn(f"tag=b&at={hour.begun_s + 1000}&period=hour")
     expect_past(page)
     expect(page.card("b")).not_to_contain_text(re.compile("pests? seen", re.IGNORECASE))

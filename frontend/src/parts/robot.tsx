@@ -150,16 +150,20 @@ export function ageOf(stamp: WireTime, time: number | null): number | null {
 
 /** Where the robot has just come from, by the positions received. */
 function useTrail(): readonly Place[] {
-  const [trail, setTrail] = useState<readonly Place[]>([]);
+  const [trail, setTrail] = useState(() => followed([]));
   useEffect(
     () =>
       robotFrame.subscribe(() => {
-        const position = robotFrame.get()?.position;
-        if (position) setTrail((last) => extended(last, [position.x, position.y]));
+        setTrail(followed);
       }),
     [],
   );
   return trail;
+}
+
+function followed(trail: readonly Place[]): readonly Place[] {
+  const position = robotFrame.get()?.position;
+  return position ? extended(trail, [position.x, position.y]) : trail;
 }
 
 /** Length of the trail: a longer one hides what the patrol crosses. */

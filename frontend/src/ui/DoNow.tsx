@@ -124,6 +124,7 @@ export function DoNow({
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
+  const isCurrent = useApp(selectIsCurrent);
   const hasOwn = health.reasons.length > 0;
   // While the twin is silent, its last tasks stay listed, below the first one: to find out why.
   const isLast = isSilent(health);
@@ -138,7 +139,7 @@ export function DoNow({
     </li>
   );
   return (
-    <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
+    <ul className="do-now" aria-label={S.todoLabel} data-fixed={most > 1 && isCurrent}>
       {isLast && own}
       {isOfTags ? (
         lines.map(([task, ...others], index) => (

@@ -23,7 +23,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: [co2] }));
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
-  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical · 1 tag');
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical');
   expect(driver().textContent).toBe('Tag 5: CO₂ 4,000\u00a0ppm, above 3,000');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');

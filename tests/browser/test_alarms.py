@@ -266,7 +266,7 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         assert where(hmi) == ["c", order[1]]
         open_resolved(hmi, 1)
         expect(rows(hmi, "resolved")).to_have_attribute("data-where", order[0])
-        # Many of one cause: the heading has the values of the worst, and the rows follow a click.
+        # Of many of one cause the heading has the worst values, and the rows follow a click.
         leave(hmi)
         robot.observe(*[warm(f"{at}", at + 3.0) for at in (40, 41, 42)] * 2)
         caused = hmi.page.locator("[data-caused=true] [data-alarm]")

@@ -194,24 +194,25 @@ function setLastAction(action: LastAction | null): void {
   if (action) timer = setTimeout(setLastAction, UNDO_MS, null);
 }
 
-function change(what: LastAction['what'], count: number, next: LocalAlarms): void {
+function change(
+  what: LastAction['what'],
+  items: readonly WithAlarm[],
+  parts: Partial<LocalAlarms>,
+): void {
   const before = own.get();
-  own.set(next);
-  setLastAction({ what, count, before, after: next });
-  acting.share?.(before, next);
+  const after = { ...before, ...parts };
+  own.set(after);
+  setLastAction({ what, count: items.length, before, after });
+  acting.share?.(before, after);
 }
 
 export const acknowledgeAlarms = (items: readonly WithAlarm[]): void => {
-  change('acknowledge', items.length, acknowledge(own.get(), items, timeOfDay()));
+  change('acknowledge', items, acknowledge(own.get(), items, timeOfDay()));
 };
 
 export const unacknowledgeAlarms = (items: readonly WithAlarm[]): void => {
-  const local = own.get();
-  const acknowledged = without(
-    local.acknowledged,
-    items.map(({ alarm }) => alarm.id),
-  );
-  change('unacknowledge', items.length, { ...local, acknowledged });
+  const ids = items.map(({ alarm }) => alarm.id);
+  change('unacknowledge', items, { acknowledged: without(own.get().acknowledged, ids) });
 };
 
 export const shelveAlarms = (
@@ -219,16 +220,12 @@ export const shelveAlarms = (
   minutes: number,
   reason: string,
 ): void => {
-  change('shelve', items.length, shelve(own.get(), items, timeOfDay() + minutes * 60_000, reason));
+  change('shelve', items, shelve(own.get(), items, timeOfDay() + minutes * 60_000, reason));
 };
 
 export const unshelveAlarms = (items: readonly WithAlarm[]): void => {
-  const local = own.get();
-  const shelved = without(
-    local.shelved,
-    items.map(({ alarm }) => faultKey(alarm)),
-  );
-  change('unshelve', items.length, { ...local, shelved });
+  const faults = items.map(({ alarm }) => faultKey(alarm));
+  change('unshelve', items, { shelved: without(own.get().shelved, faults) });
 };
 
 /** `now` with only those keys as before that the action changed and that nobody else has set since. */

@@ -89,7 +89,7 @@ export function onKey(event: KeyboardEvent): void {
   if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
   if (document.querySelector('dialog[open]')) return;
   if (event.key === 'Escape') {
-    escape(event);
+    escape();
     return;
   }
   if (!store.get().settings.shortcuts || isTyping(event.target)) return;
@@ -105,11 +105,7 @@ function isTyping(target: EventTarget | null): boolean {
   );
 }
 
-function escape(event: KeyboardEvent): void {
-  if (event.target instanceof HTMLInputElement && event.target.id === FILTER_ID) {
-    act({ filter: '' });
-    return;
-  }
+function escape(): void {
   // Close the topmost layer first.
   const { chart, selected } = store.get().view;
   if (chart) act(withChart(null));

@@ -3,10 +3,9 @@ import { useRef, type JSX } from 'react';
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
 import { selectHasSnapshot, selectTags } from '../store/moment';
-import { LONGEST_FILTER } from '../store/view';
 import { S } from '../strings';
 import { Disclosure, Icon } from '../widgets/controls';
-import { FILTER_ID, ListChoice } from './alarms/ListChoice';
+import { FILTER_ID, ListChoice, SearchField } from './alarms/ListChoice';
 import { HealthSummary } from './HealthSummary';
 import { loadParts, WithParts } from './loadDeferred';
 import { EmptyTable } from './Notices';
@@ -87,22 +86,15 @@ function FilterBar(): JSX.Element {
   return (
     <div className="filter-bar">
       <ListChoice />
-      <label className="search">
-        <span className="unseen">{S.filter}</span>
-        <Icon name="search" size={18} />
-        <input
-          id={FILTER_ID}
-          type="search"
-          value={filter}
-          placeholder={S.filterHint}
-          autoComplete="off"
-          spellCheck={false}
-          maxLength={LONGEST_FILTER}
-          onChange={(event) => {
-            act({ filter: event.target.value });
-          }}
-        />
-      </label>
+      <SearchField
+        id={FILTER_ID}
+        label={S.filter}
+        placeholder={S.filterHint}
+        value={filter}
+        onChange={(text) => {
+          act({ filter: text });
+        }}
+      />
       <span className="count" role="status" data-all={count === all} data-testid="row-count">
         {hasSnapshot && S.shownOf(count, all)}
         {status && ` · ${S.health[status]}`}

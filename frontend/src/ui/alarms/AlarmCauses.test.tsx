@@ -144,6 +144,11 @@ test('a damp spell at a tag is one row with all its values, acknowledged as one,
   const reasons = () => [...own.get().shelved.values()].map((shelf) => shelf.reason);
   expect(reasons()).toEqual(['vents stuck', 'vents stuck']);
   expect(screen.getByText('2 alarms shelved')).toBeTruthy();
+  const shelved = () => document.querySelector('[data-group=shelved] .alarm-cause')?.textContent;
+  // Held under the keyboard focus, the heading says so where it stands; then it moves.
+  expect(row?.querySelector('.alarm-tools')?.textContent).toMatch(/^shelved until [\d:]+$/);
+  fireEvent.blur(screen.getByTestId('alarms'));
+  expect(shelved()).toMatch(/shelved until [\d:]+: vents stuck/);
   fireEvent.click(screen.getByRole('button', { name: 'Undo' }));
   expect(reasons()).toEqual([]);
 });

@@ -18,7 +18,6 @@ import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { selectCatalogue } from '../../store/derived';
 import { selectLatestTag } from '../../store/moment';
-import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
@@ -26,7 +25,7 @@ import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmN
 import { AlarmRow } from './AlarmRow';
 import { ignoreDoubleClick } from './AlarmTools';
 import { CauseHeading } from './CauseHeading';
-import { ALARMS_ID, ListChoice } from './ListChoice';
+import { ALARMS_ID, ListChoice, SearchField } from './ListChoice';
 import { sharingText, useIsRefused } from './people';
 
 /** Rows shown at first, and with each "more". */
@@ -70,27 +69,12 @@ export function AlarmPanel(): JSX.Element {
     <>
       <div className="filter-bar alarm-bar">
         <ListChoice />
-        <label className="search">
-          <span className="unseen">{S.alarmFilter}</span>
-          <Icon name="search" size={18} />
-          <input
-            type="search"
-            value={filter}
-            placeholder={S.alarmFilterHint}
-            autoComplete="off"
-            spellCheck={false}
-            maxLength={LONGEST_FILTER}
-            onChange={(event) => {
-              setFilter(event.target.value);
-            }}
-            onKeyDown={(event) => {
-              if (event.key !== 'Escape' || filter === '') return;
-              setFilter('');
-              // Handled here: it must not close charts or the tag card too.
-              event.preventDefault();
-            }}
-          />
-        </label>
+        <SearchField
+          label={S.alarmFilter}
+          placeholder={S.alarmFilterHint}
+          value={filter}
+          onChange={setFilter}
+        />
         <Select
           aria-label={S.alarmOrder}
           value={order}

@@ -72,13 +72,7 @@ export const AlarmRow = memo(function AlarmRow({
             />
           )}
           {group === 'shelved' && item.shelf && (
-            <span className="alarm-facts faint">
-              {S.alarmShelved(
-                minuteText(item.shelf.until),
-                item.shelf.reason,
-                alarm.shelved_by ?? '',
-              )}
-            </span>
+            <span className="alarm-facts faint">{shelvedText(item, item.shelf.reason)}</span>
           )}
         </span>
         <AlarmFacts alarm={alarm} values={values} />
@@ -91,12 +85,22 @@ export const AlarmRow = memo(function AlarmRow({
 
 /** What was done about the alarm, or that a held row is resolved; null: neither. */
 function useStatus(item: Item, group: keyof AlarmList): string | null {
-  const { alarm, isAcknowledged, shelf } = item;
+  const { alarm, isAcknowledged } = item;
   const who = useWhoAcknowledged(alarm);
-  const belongs = groupOf(item);
-  if (group !== belongs && belongs === 'resolved') return S.alarmResolved;
-  if (group !== belongs && shelf !== null) {
-    return S.alarmShelved(minuteText(shelf.until), '', alarm.shelved_by ?? '');
-  }
+  if (group !== groupOf(item)) return elsewhereText(item);
   return isAcknowledged ? (who ?? S.healthAcknowledged) : null;
+}
+
+/** Until when an alarm is shelved, by whom, and why. */
+export const shelvedText = ({ alarm, shelf }: Item, reason: string): string =>
+  shelf ? S.alarmShelved(minuteText(shelf.until), reason, alarm.shelved_by ?? '') : '';
+
+/** Why an alarm of a held list belongs to another group; null: it is active. */
+export function elsewhereText(item: Item): string | null {
+  const belongs = groupOf(item);
+  return belongs === 'active'
+    ? null
+    : belongs === 'resolved'
+      ? S.alarmResolved
+      : shelvedText(item, '');
 }

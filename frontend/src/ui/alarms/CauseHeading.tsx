@@ -13,6 +13,7 @@ import { S } from '../../strings';
 import { Icon } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { AlarmFacts, AlarmTimes, AlarmTodo, useValues } from './AlarmFacts';
+import { elsewhereText, shelvedText } from './AlarmRow';
 import { AlarmTools } from './AlarmTools';
 import { useWhoAcknowledged } from './people';
 
@@ -41,7 +42,9 @@ export function CauseHeading({
   const tags = tagsOf(items);
   const isOfOne = tags.length === 1;
   const sensors = useApp(selectCatalogue);
-  const who = useWhoAcknowledged(isOfOne && first ? first.alarm : null);
+  const by = first?.alarm.acknowledged_by;
+  const isByOne = shown.every(({ alarm }) => alarm.acknowledged_by === by);
+  const who = useWhoAcknowledged(isByOne && first ? first.alarm : null);
   // As text, so that a new state with the same counts does not re-render.
   const key = useApp((state) => JSON.stringify(countsNow(state, shown)));
   const counts = JSON.parse(key) as ReturnType<typeof countsNow>;
@@ -55,7 +58,8 @@ export function CauseHeading({
   // What was resolved last stands first.
   const times = isOver ? alarm : (oldestOf(shown) ?? alarm);
   const waiting = group === 'active' ? unacknowledged(own) : [];
-  const status = own.length === 0 ? S.alarmCount(0) : (who ?? S.healthAcknowledged);
+  const status = own.length === 0 ? elsewhereText(first) : (who ?? S.healthAcknowledged);
+  const shelves = new Set(shown.map((item) => shelvedText(item, item.shelf?.reason ?? '')));
   return (
     <div
       className="alarm-cause"
@@ -79,6 +83,7 @@ export function CauseHeading({
             <span className="alarm-many">
               {S.alarmCount(own.length)}{' '}
               {!isOfOne &&
+                own.length > 0 &&
                 counts.length > 1 &&
                 counts.map(([each, count]) => (
                   <Fragment key={each}>
@@ -89,6 +94,9 @@ export function CauseHeading({
             </span>
           </span>
           {group === 'active' && <AlarmTodo text={todo} />}
+          {group === 'shelved' && (
+            <span className="alarm-facts faint">{[...shelves].join('; ')}</span>
+          )}
           <span className="alarm-facts faint">
             {isOfOne && airOf(alarm.reason) ? parts : tagsText(tags)}
           </span>
@@ -103,7 +111,6 @@ export function CauseHeading({
           items={shown}
           waiting={waiting}
           name={cause}
-          // By whom, each row says.
           status={waiting.length > 0 ? null : group === 'active' ? status : ''}
         />
       )}

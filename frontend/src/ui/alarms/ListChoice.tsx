@@ -6,9 +6,9 @@ import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectIsDisconnected } from '../../store/moment';
-import { type ViewState, withList } from '../../store/view';
+import { LONGEST_FILTER, type ViewState, withList } from '../../store/view';
 import { S } from '../../strings';
-import { Segmented } from '../../widgets/controls';
+import { Icon, Segmented } from '../../widgets/controls';
 import { HealthShape } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
 
@@ -17,6 +17,44 @@ export const ALARMS_ID = 'alarms';
 
 /** Element id of the table's filter field, to move the focus there. */
 export const FILTER_ID = 'tag-filter';
+
+/** The field that filters a list. */
+export function SearchField({
+  label,
+  value,
+  onChange,
+  ...rest
+}: {
+  id?: string;
+  label: string;
+  placeholder: string;
+  value: string;
+  onChange: (text: string) => void;
+}): JSX.Element {
+  return (
+    <label className="search">
+      <span className="unseen">{label}</span>
+      <Icon name="search" size={18} />
+      <input
+        {...rest}
+        type="search"
+        value={value}
+        autoComplete="off"
+        spellCheck={false}
+        maxLength={LONGEST_FILTER}
+        onChange={(event) => {
+          onChange(event.target.value);
+        }}
+        onKeyDown={(event) => {
+          if (event.key !== 'Escape' || value === '') return;
+          onChange('');
+          // Handled here: it must not close charts or the tag card too.
+          event.preventDefault();
+        }}
+      />
+    </label>
+  );
+}
 
 /** Chooses the list beside the map; a narrow screen has tabs at its foot instead. */
 export function ListChoice(): JSX.Element {

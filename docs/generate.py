@@ -172,7 +172,7 @@ def http() -> str:
     return page(
         "HTTP routes",
         prose(document["info"]["description"]),
-        "A running bridge serves the same as `/openapi.json`, and as a page at `/docs`.",
+        "A running bridge serves the same as `/openapi.json`; its `/docs` leads to this page.",
         *sections,
         "## Other routes",
         "Pages, documents and WebSockets, which OpenAPI does not describe.",

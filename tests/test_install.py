@@ -79,7 +79,7 @@ def test_without_the_page_the_start_and_the_address_say_how_to_build_it(
             assert "npm ci && npm run build" in answer.text or method == "HEAD"
         assert "WARNING" in process.wait_for_output("npm ci && npm run build")
         # The rest is there, with the package's data files.
-        for path in ("/healthz", "/docs", "/signin.css"):
+        for path in ("/healthz", "/openapi.json", "/signin.css"):
             assert httpx.get(url + path, trust_env=False, timeout=PATIENCE_S).status_code == 200
 
 

@@ -355,7 +355,7 @@ class Bridge:
         wire = await asyncio.wrap_future(
             self.workers.submit(lambda _: alarms_message(board, now_ns, notes, count), ALARMS_S)
         )
-        self.hub.publish_alarms(wire, self._clock())
+        self.hub.publish_beside("alarms", wire, self._clock())
         return len(wire)
 
     def _on_death(self) -> None:

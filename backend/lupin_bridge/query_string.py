@@ -64,7 +64,9 @@ def read(kind: type[QueryT], given: Parameters) -> QueryT:
     values: dict[str, str] = {}
     for name, value in given:
         if name not in names:
-            raise PastRefused(f"parameter {name[:64]!r} is unknown, expected {', '.join(names)}")
+            raise PastRefused(
+                f"parameter {name[:64]!r} is unknown, expected {', '.join(names) or 'none'}"
+            )
         if names[name] in values:
             raise PastRefused(f"{name} is given more than once, expected one value")
         if "\0" in value:  # PostgreSQL has no such text, and ROS no such name
@@ -78,6 +80,11 @@ def read(kind: type[QueryT], given: Parameters) -> QueryT:
         shown = f" is {first['input'][:64]!r}" if isinstance(first["input"], str) else ""
         raise PastRefused(f"{name}{shown}: {why[0].lower()}{why[1:]}") from None
     return query
+
+
+@dataclass(frozen=True, slots=True)
+class NoParameters:
+    """The query of a route that has no parameters."""
 
 
 def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ import './styles/map.css';
 import './styles/legend.css';
 import './styles/health.css';
 import './styles/strip.css';
+import './styles/long.css';
 import './styles/table.css';
 import './styles/table-sizes.css';
 import './styles/ages.css';

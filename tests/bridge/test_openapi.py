@@ -1,9 +1,8 @@
-"""The OpenAPI document and its page: complete, and available without ROS."""
+"""The OpenAPI document: complete, and available without ROS."""
 
 import json
 import subprocess
 import sys
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,8 @@ from pydantic import BaseModel
 from std_msgs.msg import Header
 
 from lupin_bridge.app import document
-from lupin_bridge.routes.pages import render
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.pollers import GetEstimateResponse
-from tests.support.web import ROUTES
 
 DOCUMENT: dict[str, Any] = json.loads(document())
 
@@ -66,72 +63,6 @@ def test_the_copy_for_the_browsers_types_is_up_to_date() -> None:
     assert copy.read_bytes() == document(), (
         f"stale: run `python -m lupin_bridge.app > {copy}` and `npm run types:gen`"
     )
-
-
-PAGE = render(DOCUMENT, "http://twin:8000")
-
-
-class Page(HTMLParser):
-    """A page's text, ids and links; refuses tags that are not closed in order."""
-
-    VOID = ("meta", "link", "br", "img", "input")
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.text = ""
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self._open: list[str] = []
-        self.feed(html)
-        self.close()
-        assert self._open == []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        if tag not in self.VOID:
-            self._open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self._open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
-
-    def attributes(self, name: str) -> list[str]:
-        return [attrs[name] or "" for _, attrs in self.tags if name in attrs]
-
-
-def test_every_route_and_parameter_is_listed_with_a_line_for_curl() -> None:
-    text = Page(PAGE).text
-    for path, described in ROUTES.items():
-        assert (f"GET {path}" in text) == described
-        assert (f"curl 'http://twin:8000{path}" in text) == described
-    assert "curl 'http://twin:8000/api/field.png?sensor_type=…'" in text
-    for parameter in DOCUMENT["paths"]["/api/field"]["get"]["parameters"]:
-        assert parameter["description"] in text
-
-
-def test_the_page_of_routes_loads_nothing_but_its_style() -> None:
-    page = Page(PAGE)
-    assert page.attributes("href") == ["docs.css", "openapi.json", "docs/guide/"]
-    tags = [tag for tag, _ in page.tags]
-    assert not set(tags) & {"script", "style", "img", "iframe"}
-    assert tags.count("link") == 1
-    assert page.attributes("style") == []
-
-
-@pytest.mark.parametrize("kind", ["route", "parameter", "address"])
-def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
-    markup, address = "<script>alert('x')</script>", "http://twin"
-    hostile = json.loads(document())
-    if kind == "route":
-        hostile["paths"][f"/{markup}"] = hostile["paths"]["/api/state"]
-    elif kind == "parameter":
-        hostile["paths"]["/api/field"]["get"]["parameters"][0]["description"] = markup
-    else:
-        address = f"http://{markup}"
-    page = Page(render(hostile, address))
-    assert "script" not in {tag for tag, _ in page.tags}
-    assert markup in page.text
 
 
 def names(message_type: Any) -> list[str]:

@@ -216,9 +216,16 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     status, map_ = places(hmi, ".health", ".map-panel")
     assert (status.left, status.bottom) == (map_.left, map_.top)
     assert map_.right > 0.6 * 1280
-    # A tall one leaves the table what it does not need.
+    # The map of a long one is as wide as the page, and the table has the height above it.
     hmi.resize(1440, 900)
     hmi.go()
     hmi.expect_map()
+    running.peer.publish_map(occupancy_grid([[0] * 60] * 8))
+    expect(hmi.page.locator(".panels")).to_have_attribute("data-long", "true")
+    status, map_, table = places(hmi, *parts)
+    assert (map_.left, map_.right, map_.bottom) == (0, 1440, 900)
+    assert status.right == table.left
+    assert status.bottom == table.bottom == map_.top > 400
+    # A tall one leaves the table what it does not need.
     running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
     hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")

@@ -11,18 +11,13 @@ from tests.browser.places import place, places
 from tests.support.web import Bridge
 
 
-def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: Hmi) -> None:
-    for size in ((844, 390), (1280, 600)):
+def test_sensors_are_one_line_with_the_chosen_one_in_sight(hmi: Hmi) -> None:
+    for size in ((844, 390), (1280, 600), (1024, 768)):
         hmi.resize(*size)
         hmi.choose_sensor("Dew margin")
         chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
         assert bar.bottom - bar.top < 60
         assert bar.left <= chosen.left < chosen.right <= bar.right
-    # So has a wide one, where there is room for it.
-    hmi.resize(1440, 900)
-    names = hmi.page.locator(".sensors label")
-    expect(names).to_have_count(8)
-    assert len({place(name).top for name in names.all()}) == 1
 
 
 def test_the_row_of_sensors_fades_where_there_are_more(
@@ -34,14 +29,14 @@ def test_the_row_of_sensors_fades_where_there_are_more(
     expect(row).to_have_css("mask-image", re.compile("gradient"))
     hmi.choose_sensor("Dew margin")
     expect(row).to_have_attribute("data-more", "before")
-    # In a wider window they wrap, and all of them are in sight.
-    for width in (700, 1100, 1440, 3840):
+    # In a wider window, all of them are in sight.
+    for width in (700, 1440, 3840):
         hmi.resize(width, 900)
         expect(row).to_have_attribute("data-more", "")
         expect(row).to_have_css("mask-image", "none")
         last, bar = places(hmi, ".sensors label:last-child", ".sensor-picker")
         assert bar.left < last.left < last.right <= bar.right
-        assert last.bottom < bar.bottom
+        assert last.bottom <= bar.bottom
 
 
 def test_a_sensor_has_its_colours_texts_legend_and_column(hmi: Hmi) -> None:

@@ -19,6 +19,7 @@ from lupin_twin.core.state import (
     TagState,
     TwinStore,
 )
+from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.runtime.memory import Memory, open_journal
@@ -104,10 +105,7 @@ class Twin:
         wait_for(lambda: self.memory.condition.waiting == 0, "all to be written")
         offset_ns = 0 if self.is_simulated else NOW
         at_ns = self.now_ns if at_s is None else int(at_s * S) + offset_ns
-        requested = self.memory.recall.query(
-            lambda connection, _: state_at(connection, at_ns, "map")
-        )
-        return by_id(requested.result(20.0))
+        return by_id(self.memory.recall.answer(lambda log, _: state_at(log, at_ns, "map"), never))
 
     def reading(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
         """A sensor's value and age, the same live and in the log."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, board_of, change_between
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_bridge.judge.day import ClockDay, Day, judge_day
+from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm, alarm_id
 from lupin_bridge.judge.judging import Criteria, judge_once, own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
@@ -25,7 +25,7 @@ class ByLight(Criteria):
     """Whether it is day, by the light alone."""
 
     def day(self, light: bool | None, stamp_ns: int) -> Day:
-        return judge_day(light, None, None)
+        return super().day(light, 0)
 
 
 BY_LIGHT = ByLight(SENSORS, None, ClockDay(None))

@@ -21,16 +21,11 @@ from tests.support.ws_client import open_websocket
 
 Frame = dict[str, Any]
 
-# Every HTTP route for GET, and whether OpenAPI describes it (not a page or the document itself):
-# from the copy of the document that is in git. Two routes exist only where there are accounts.
+# Every HTTP route for GET, from the copy of the OpenAPI document that is in git; and that itself. Two
+# routes exist only where there are accounts.
 _DOCUMENT = json.loads((ROOT / "frontend" / "openapi.json").read_text(encoding="utf-8"))
-ROUTES = {
-    **{path: True for path, it in _DOCUMENT["paths"].items() if "get" in it},
-    "/openapi.json": False,
-    "/docs": False,
-}
-for _path in ("/api/audit", "/api/push"):
-    del ROUTES[_path]
+_READ = [path for path, it in _DOCUMENT["paths"].items() if "get" in it]
+ROUTES = [path for path in (*_READ, "/openapi.json") if path not in ("/api/audit", "/api/push")]
 
 
 def ws_url(url: str, **query: Any) -> str:

@@ -148,7 +148,7 @@ class Accounts:
                 execute(f"PRAGMA query_only = {int(not is_writer)}")
                 (self.id,) = execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
             except sqlite3.Error as error:
-                why = f"the file of accounts {path} cannot be read: {error}"
+                why = f"the file of accounts {path} cannot be read: {_words(error)}"
                 if not path.exists():
                     why = f"there is no file of accounts {path}: user add or token add creates it"
                 raise AccountError(why) from error
@@ -167,14 +167,16 @@ class Accounts:
             with connection:
                 yield connection
         except sqlite3.Error as error:
-            raise AccountError(f"the file of accounts cannot be written: {error}") from error
+            raise AccountError(
+                f"the file of accounts cannot be written: {_words(error)}"
+            ) from error
 
     def _rows(self, sql: str, *values: object) -> list[Any]:
         """What a query finds; errors of SQLite become `AccountError`."""
         try:
             return self._connection.execute(sql, values).fetchall()
         except sqlite3.Error as error:
-            raise AccountError(f"the file of accounts cannot be read: {error}") from error
+            raise AccountError(f"the file of accounts cannot be read: {_words(error)}") from error
 
     # --- accounts and tokens ------------------------------------------------------------------
 
@@ -364,6 +366,13 @@ class Accounts:
         """The audit trail, newest first."""
         sql = "SELECT at_s, who, what, subject, address FROM audit ORDER BY number DESC LIMIT ?"
         return [Audited(*row) for row in self._rows(sql, most)]
+
+
+def _words(error: sqlite3.Error) -> str:
+    name = getattr(error, "sqlite_errorname", "")
+    if not name.startswith(("SQLITE_FULL", "SQLITE_IOERR")):
+        return str(error)
+    return f"{error}; if its disk is full, make room there: reading needs 64 kB beside the file too"
 
 
 def _lines(text: str) -> tuple[str, ...]:

@@ -77,7 +77,7 @@ class Proxies:
                 f"is {header[:128]!r}, must be a header's name, such as Remote-User",
             )
         called = settings.called("trusted_proxy")
-        trusted = [_network(text, called) for text in settings.trusted_proxy]
+        trusted = [each for text in settings.trusted_proxy for each in _networks(text, called)]
         if unix_path(settings.host) is not None:
             trusted.append(UNIX)
         if header and not trusted:
@@ -107,7 +107,13 @@ class BehindProxies:
             peer = (scope.get("client") or ("", 0))[0]
             peer = str(_address(peer) or peer) or UNIX
             user = self._user(scope) if peer in self._app.trusted_hosts else {}
-            scope = {**scope, "client": (peer, 0), **user, **self._path(scope)}
+            # Of several proxies, the first has received the client's own request.
+            headers = [
+                (name, value.partition(b",")[0] if name == b"x-forwarded-proto" else value)
+                for name, value in scope["headers"]
+            ]
+            own = {"client": (peer, 0), "headers": headers}
+            scope = {**scope, **own, **user, **self._path(scope)}
         await self._app(scope, receive, send)
 
     def _user(self, scope: Scope) -> dict[str, object]:
@@ -135,9 +141,12 @@ def path_of(scope: Scope) -> str:
     return path[len(scope.get("root_path", "")) :]
 
 
-def _network(text: str, called: str) -> str:
+def _networks(text: str, called: str) -> list[str]:
+    """The network, and the same in the IPv6 spelling that a proxy may forward (`::ffff:`)."""
     try:
-        return str(ip_network(text.strip("[]")))
+        found = ip_network(text.strip("[]"))
+        mapped = f"::ffff:{found.network_address}/{96 + found.prefixlen}"
+        return [str(found), *([mapped] if found.version == 4 else [])]
     except ValueError:
         raise SettingError(
             f"{called} is {text[:128]!r}, must be an address or a network, such as 10.0.0.7 or "

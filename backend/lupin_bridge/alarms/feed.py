@@ -23,7 +23,7 @@ from lupin_bridge.alarms.board import (
 )
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, end
-from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmLog, Found
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.scans import recent_writes, writes_of
@@ -77,9 +77,6 @@ _ALL_TIME: Final = (RunSpan(RUN, 0, FOREVER_NS),)
 _SILENCES: Final = 100
 _UNREADABLE: Final = (NotRemembered, PastRefused, TwinUnavailableError)
 
-# What a board is made of: alarms of the log, silences, and since when cleared alarms are kept.
-_NOTHING: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
-
 ResultT = TypeVar("ResultT")
 
 
@@ -116,8 +113,9 @@ class AlarmFeed:
         self._silences: list[Alarm] = []
         # The last known time of the twin.
         self._last_ns: int | None = None
-        self._alarms: tuple[Alarm, ...] = ()
-        self._newest_board, self._board_of = Board(), _NOTHING
+        # What the newest board is made of: alarms of the log, silences, and since when cleared
+        # alarms are kept.
+        self._board_of: tuple[tuple[Alarm, ...], tuple[Alarm, ...], int] = ((), (), 0)
         self._again: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -248,24 +246,19 @@ class AlarmFeed:
         return is_all
 
     async def _publish(self) -> None:
-        alarm_log, fold, now_ns = self._log, self._log.fold, self._now_ns()
+        alarm_log, fold, now_ns, seen = self._log, self._log.fold, self._now_ns(), self._seen
+        if seen is not None and seen.clock == "doubted":
+            now_ns = seen.stamp_ns  # alarms of the log stand; what is unknown is how old they are
         if fold is None or now_ns is None:
             await self._publish_silence(0.0)
             return
         moment_ns, since_ns = now_ns, max(0, now_ns - int(self._days * DAY_NS))
-        beside = tuple(self._silences)
-
-        def find(_: object) -> tuple[Board, Change, Found]:
-            found = fold.found(moment_ns, since_ns)
-            self._alarms = found.alarms
-            return *self._newest(beside, since_ns), found
-
-        board, change, found = await self._on_worker(find)
+        found = await self._on_worker(lambda _: fold.found(moment_ns, since_ns))
         self._due_ns = found.due_ns
         self.judge.note_days(found.days)
         is_past, self._is_caught_up = not self._is_caught_up, True
         begins_ns = moment_ns if alarm_log.since_ns is None else alarm_log.since_ns
-        self._board.put(board, replace(change, is_past=is_past), self._alarm_source, begins_ns)
+        await self._put(found.alarms, since_ns, self._alarm_source, begins_ns, is_past=is_past)
 
     async def _publish_silence(self, unanswered_s: float) -> None:
         """Publish silences with the last known alarms: nothing else reports that a twin is gone.
@@ -273,25 +266,35 @@ class AlarmFeed:
         If the twin is live but its journal does not answer, the source is `starting`: these alarms
         may not be all there are.
         """
-        now, beside = self._board.now, tuple(self._silences)
-        since_ns = self._board_of[2]
-        board, change = await self._on_worker(lambda _: self._newest(beside, since_ns))
-        is_removed = any(alarm.is_active for alarm in beside)
+        now, (alarms, _, since_ns) = self._board.now, self._board_of
+        is_removed = any(alarm.is_active for alarm in self._silences)
         is_old = unanswered_s >= UNANSWERED_S and not is_removed
         source: AlarmSource = "starting" if is_old else now.source
-        self._board.put(board, change, source, now.since_ns)
+        await self._put(alarms, since_ns, source, now.since_ns)
 
-    def _newest(self, beside: tuple[Alarm, ...], since_ns: int) -> tuple[Board, Change]:
-        """The newest board, the same object if nothing has changed. Call it on a worker."""
-        alarms, before = self._alarms, self._newest_board
-        known, known_beside, known_ns = self._board_of
+    async def _put(
+        self,
+        alarms: tuple[Alarm, ...],
+        since_ns: int,
+        source: AlarmSource,
+        begins_ns: int | None,
+        *,
+        is_past: bool = False,
+    ) -> None:
+        """Publish alarms of the log with the silences, without those cleared before `since_ns`."""
+        before, beside = self._board.now, tuple(self._silences)
         # Alarms are dropped for their age once an hour.
         since_ns -= since_ns % FORGET_EVERY_NS
-        if alarms is known and (beside, since_ns) == (known_beside, known_ns):
-            return before, Change(())
-        self._newest_board = now = board_of((*alarms, *beside), since_ns)
-        self._board_of = alarms, beside, since_ns
-        return now, change_between(before, now, since_ns)
+
+        def newest(_: object) -> tuple[Board, Change]:
+            now = board_of((*alarms, *beside), since_ns)
+            return now, replace(change_between(before, now, since_ns), is_past=is_past)
+
+        board, change = before, Change((), is_past=is_past)
+        if alarms is not self._board_of[0] or (beside, since_ns) != self._board_of[1:]:
+            board, change = await self._on_worker(newest)
+            self._board_of = alarms, beside, since_ns
+        self._board.put(board, change, source, begins_ns)
 
     async def _on_worker(self, work: Callable[[object], ResultT]) -> ResultT:
         """Run the work on a worker, where it does not block the event loop."""

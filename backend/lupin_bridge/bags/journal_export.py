@@ -76,8 +76,10 @@ class JournalRows:
         self._connection = connection
         self._period = {"site": LOCAL_SITE, "start": start_ns, "end": end_ns}
         with one_view(connection):
-            self._spans = cut(spans(runs(connection.execute)), start_ns, end_ns)
-            self.runs: dict[int, Run] = {span.run.id: span.run for span in self._spans}
+            every = runs(connection.execute)
+            self._spans = cut(spans(every), start_ns, end_ns)
+            by_id = {run.id: run for run in every}
+            self.runs: dict[int, Run] = {span.run: by_id[span.run] for span in self._spans}
             self.places = self._places_before(start_ns)
 
     def __iter__(self) -> Iterator[tuple[Run, Write]]:
@@ -124,8 +126,7 @@ class JournalRows:
 
     def _holds(self, run: Run, stamp_ns: int) -> bool:
         return any(
-            span.run.id == run.id and span.start_ns <= stamp_ns < span.end_ns
-            for span in self._spans
+            span.run == run.id and span.start_ns <= stamp_ns < span.end_ns for span in self._spans
         )
 
 

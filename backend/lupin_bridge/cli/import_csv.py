@@ -395,6 +395,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
         with closing(open_named(path)) as connection:
             known = runs(connection.execute)
             placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
+        by_id = {run.id: run for run in known}
         if any(run.begun.is_simulated for run in known):
             raise CommandError(f"the journal {path} is a simulation's: import into another one")
         while batch := list(islice(found, _BATCH)):
@@ -415,7 +416,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                     own_stamp_ns=stamp_ns,
                     arrival_ns=stamp_ns,
                 )
-                rows.append((known[0] if span is None else span.run, scan))
+                rows.append((known[0] if span is None else by_id[span.run], scan))
             written, refused = file.append(rows)
             new += written
             if refused:

@@ -39,7 +39,7 @@ from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import latest
 from lupin_twin.journal.writes import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall, Search
-from lupin_twin.runtime.workers import ShouldStop
+from lupin_twin.runtime.workers import ShouldStop, Workers
 
 if TYPE_CHECKING:
     from lupin_twin.estimate.engine import TagPast
@@ -140,7 +140,7 @@ NICENESS: Final = 5
 
 
 class Child:
-    """Answers queries until its input ends; `recall` runs them on the log.
+    """Answers queries until its input ends; `recall` runs them on the log, in worker threads.
 
     The input is pairs of a number and a query, pickled with its `Now` and its cost; or None, which
     cancels the query of that number.
@@ -149,6 +149,7 @@ class Child:
     def __init__(self, recall: type[Recall] = Recall) -> None:
         self._condition = UNKNOWN_JOURNAL
         self._recall = recall(lambda: self._condition)
+        self._workers = Workers("memory")
         self._running: dict[int, Future[Any]] = {}
         self._sending = threading.Lock()
         self._out: IO[bytes]
@@ -176,7 +177,7 @@ class Child:
             self._send(number, True, error)
             return
         self._condition = now.condition
-        running = self._recall.query(search, cost_s)
+        running = self._workers.submit(partial(self._recall.answer, search), cost_s)
         self._running[number] = running
         running.add_done_callback(partial(self._reply, number))
 

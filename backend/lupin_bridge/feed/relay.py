@@ -149,12 +149,8 @@ class Relay:
         self.linger_s = LINGER_S
         # Samples that were too large, or dropped before the loop had taken them.
         self.skipped = 0
-        self._topics: dict[Topic, _Relayed] = {}
+        self.topics: dict[Topic, _Relayed] = {}
         self._closing: set[asyncio.Task[None]] = set()
-
-    def __len__(self) -> int:
-        """How many topics are relayed."""
-        return len(self._topics)
 
     async def listen(self, topic: Topic, on_sample: Callable[[Sample], None]) -> Callable[[], None]:
         """Listen to a topic, whoever publishes it; returns a function that ends this, idempotent.
@@ -164,9 +160,9 @@ class Relay:
             TwinUnavailableError: the ROS thread has ended.
 
         """
-        relayed = self._topics.get(topic)
+        relayed = self.topics.get(topic)
         if relayed is None:
-            relayed = self._topics[topic] = _Relayed(topic)
+            relayed = self.topics[topic] = _Relayed(topic)
             self._open(relayed)
         for sample in list(relayed.latched.samples):
             on_sample(sample)
@@ -181,7 +177,7 @@ class Relay:
 
     def renew(self) -> None:
         """Subscribe to all topics again, on a new node."""
-        for relayed in self._topics.values():
+        for relayed in self.topics.values():
             self._open(relayed)
 
     async def published(self, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
@@ -233,8 +229,8 @@ class Relay:
             self._forget(relayed)
 
     def _forget(self, relayed: _Relayed) -> None:
-        if self._topics.get(relayed.topic) is relayed:
-            del self._topics[relayed.topic]
+        if self.topics.get(relayed.topic) is relayed:
+            del self.topics[relayed.topic]
 
     def _leave(self, relayed: _Relayed, on_sample: Callable[[Sample], None]) -> None:
         if on_sample in relayed.listeners:
@@ -243,7 +239,7 @@ class Relay:
                 asyncio.get_running_loop().call_later(self.linger_s, self._end, relayed)
 
     def _end(self, relayed: _Relayed) -> None:
-        if relayed.listeners or self._topics.get(relayed.topic) is not relayed:
+        if relayed.listeners or self.topics.get(relayed.topic) is not relayed:
             return  # somebody listens again, or it has ended
         self._forget(relayed)
         task = asyncio.create_task(self._unsubscribe(relayed))

@@ -29,7 +29,9 @@ from lupin_bridge.feed.tasks import Periodic, Shared
 from lupin_bridge.fleet.compare import (
     COMPARE_S,
     Compare,
+    OfCompare,
     OfSites,
+    OfSitesReport,
     SitesReport,
     chosen,
     compare,
@@ -40,7 +42,6 @@ from lupin_bridge.fleet.overview import (
     SitesFrame,
     alarms_json,
     archive_json,
-    map_svg,
     map_version,
     site_json,
 )
@@ -54,12 +55,14 @@ from lupin_bridge.query_string import OfExport, parameter, read
 from lupin_bridge.routes import pages, status
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
+    ApiRoute,
     add_refusals,
     error_response,
     has_etag,
     json_response,
     not_modified,
     person_of,
+    read_route,
     respond,
 )
 from lupin_bridge.routes.export import Format, respond_export, span_of
@@ -216,6 +219,13 @@ class OfSitesExport(OfExport):
     sites: str | None = parameter("names of sites, separated by commas; default: all")
 
 
+@dataclass(frozen=True, slots=True)
+class OfPicture:
+    """The parameter of `/api/sites/{name}/map.svg`."""
+
+    v: str | None = parameter("ignored: a new one keeps a browser from showing an old picture")
+
+
 async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:
     """Every row of a period, of the named sites or of all."""
     given = read(OfSitesExport, request.query_params.multi_items())
@@ -261,6 +271,7 @@ def create_fleet_app(
     app = FastAPI(title="lupin-twin fleet", version=__version__, openapi_url=None)
     app.state.access = access
     app.state.bridge = fleet
+    app.router.route_class = ApiRoute
     add_refusals(app)
     _add_overview(app, fleet)
     _add_answers(app, fleet)
@@ -296,7 +307,7 @@ async def _not_found(request: Request, _error: Exception) -> Response:
 
 
 def _add_overview(app: FastAPI, fleet: Fleet) -> None:
-    @app.api_route("/api/sites", methods=["GET", "HEAD"])
+    @read_route(app.router, "/api/sites")
     async def overview(request: Request) -> Response:
         """Every site of the archive, by name."""
         sites, archive = fleet.sites_for(request), fleet.watching.archive
@@ -304,7 +315,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         entries = [site_json(site, archive, now_ns) for site in sites.values()]
         return json_response(orjson.dumps({"sites": entries}), 200)
 
-    @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
+    @read_route(app.router, "/api/sites/{name}/map.svg", OfPicture)
     async def site_map(request: Request, name: str) -> Response:
         """A picture of where the tags of a site are, and of their verdicts."""
         site = fleet.watching.sites.get(name)
@@ -314,7 +325,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         if has_etag(request, tag):
             return not_modified(tag)
         headers = {"ETag": tag, **REVALIDATE, "Content-Security-Policy": _PICTURE_POLICY}
-        return Response(map_svg(site.dots), 200, headers, "image/svg+xml")
+        return Response(site.dots, 200, headers, "image/svg+xml")
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:
@@ -335,10 +346,10 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
 def _add_answers(app: FastAPI, fleet: Fleet) -> None:
     """Routes over several sites at once."""
     for kind in (Csv, Parquet):
-        path = f"/api/export.{kind.name}"
-        app.api_route(path, methods=["GET", "HEAD"])(partial(respond_sites, fleet, kind))
+        export = partial(respond_sites, fleet, kind)
+        read_route(app.router, f"/api/export.{kind.name}", OfSitesExport)(export)
 
-    @app.api_route("/api/alarms", methods=["GET", "HEAD"])
+    @read_route(app.router, "/api/alarms", OfSites)
     async def alarms(request: Request) -> Response:
         """Active alarms of all sites, the worst first."""
         given = read(OfSites, request.query_params.multi_items())
@@ -355,7 +366,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
 
         return await respond(request, key, compute)
 
-    @app.api_route("/api/compare", methods=["GET", "HEAD"])
+    @read_route(app.router, "/api/compare", OfCompare)
     async def compared(request: Request) -> Response:
         """One sensor of several sites."""
         watching = fleet.watching
@@ -365,7 +376,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
             request, compare(parameters, names, watching.now_ns, fleet.criteria.sensors)
         )
 
-    @app.api_route("/api/report", methods=["GET", "HEAD"])
+    @read_route(app.router, "/api/report", OfSitesReport)
     async def reported(request: Request) -> Response:
         """A row for each site, with its counts and the address of its report; the newest notes."""
         parameters, now_ns = request.query_params.multi_items(), fleet.watching.now_ns
@@ -382,19 +393,19 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
 
 
 def _add_probes(app: FastAPI, fleet: Fleet) -> None:
-    @app.api_route("/healthz", methods=["GET", "HEAD"])
+    @read_route(app.router, "/healthz")
     async def healthz() -> Response:
         """The process is alive, whatever becomes of the archive."""
         return json_response(orjson.dumps({"ok": True, "message": "The fleet's page is served."}))
 
-    @app.api_route("/readyz", methods=["GET", "HEAD"])
+    @read_route(app.router, "/readyz")
     async def readyz() -> Response:
         """503 while the archive does not answer."""
         archive = fleet.watching.archive
         body = {**archive_json(archive), "sites": len(fleet.watching.sites)}
         return json_response(orjson.dumps(body), 200 if archive.is_reachable else 503)
 
-    @app.api_route("/metrics", methods=["GET", "HEAD"])
+    @read_route(app.router, "/metrics")
     async def metrics() -> Response:
         """In Prometheus' text format."""
         lines = [

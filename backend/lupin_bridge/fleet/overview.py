@@ -24,24 +24,26 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, TagState
 from lupin_twin.field.grid import reach_of
 
-# Positions along each side. Of several tags at one position, the worst is drawn, so that no map is
-# larger than 7 kB, whatever the site.
-_ALONG_X: Final = 40
-_ALONG_Y: Final = 20
-# Not by colour alone: the worse, the larger.
+# Positions along the longer and the shorter side. Of several tags at one position, the worst is
+# drawn, so that no map is larger than 7 kB, whatever the site.
+_LONG: Final = 40
+_SHORT: Final = 20
+# Not by colour alone: the worse, the larger. On a large card, dots need less of the map.
 _STYLE: Final = (
     "path{stroke-linecap:round;stroke-width:1.8}"
     ".critical{stroke:#c4211a;stroke-width:3}.stressed{stroke:#f5a800;stroke-width:2.4}"
     ".healthy{stroke:#1f7a45}.unknown{stroke:#7d8982}"
+    "@media(min-width:150px),(min-height:150px){path{stroke-width:1}.critical{stroke-width:1.8}"
+    ".stressed{stroke-width:1.4}}"
     "@media(prefers-color-scheme:dark){.critical{stroke:#ff6456}.stressed{stroke:#ffd166}"
     ".healthy{stroke:#52c7b0}}"
 )
 
 
 def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
-    """A path for each verdict, the worst on top; empty: no tag has a pose.
+    """An SVG with a path for each verdict, the worst on top; empty: no tag has a pose.
 
-    A tag that is far off the others is left out, or the others would become one dot.
+    It is upright if the greenhouse is longer along y. A tag that is far off the others is left out, or the others would become one dot.
     """
     every = [
         (pose.x, pose.y, healths[tag.tag_id].verdict)
@@ -54,37 +56,33 @@ def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
         return ""
     left, top = min(x for x, _, _ in placed), max(y for _, y, _ in placed)
     width, height = max(x for x, _, _ in placed) - left, top - min(y for _, y, _ in placed)
-    metres = max(width / _ALONG_X, height / _ALONG_Y) or 1.0
-    # Centred; y grows upwards in the map frame, and downwards here.
-    right, down = (_ALONG_X - width / metres) / 2, (_ALONG_Y - height / metres) / 2
+    across, along = (_LONG, _SHORT) if width >= height else (_SHORT, _LONG)
+    metres = max(width / across, height / along) or 1.0
     drawn: dict[tuple[int, int], Verdict] = {}
     for x, y, verdict in placed:
-        at = round((x - left) / metres + right), round((top - y) / metres + down)
+        # y grows upwards in the map frame, and downwards here.
+        at = round((x - left) / metres), round((top - y) / metres)
         drawn[at] = worst((drawn.get(at, verdict), verdict)) or verdict
     paths = []
     for verdict in reversed(Verdict):
         path = "".join(f"M{x} {y}h0" for (x, y), its in sorted(drawn.items()) if its is verdict)
         if path:
             paths.append(f'<path class="{verdict}" d="{path}"/>')
-    return "".join(paths)
+    across, along = round(width / metres) + 4, round(height / metres) + 4
+    size = f'width="{20 * across}" height="{20 * along}" viewBox="-2 -2 {across} {along}"'
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size}><style>{_STYLE}</style>'
+    return f"{head}{''.join(paths)}</svg>"
 
 
-def map_svg(paths: str) -> bytes:
-    """The picture of `dots`."""
-    box = f"-2 -2 {_ALONG_X + 4} {_ALONG_Y + 4}"
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{box}"><style>{_STYLE}</style>'
-    return f"{head}{paths}</svg>".encode()
-
-
-def map_version(paths: str) -> str | None:
+def map_version(svg: str) -> str | None:
     """A digest that changes with the map; None: there is nothing to draw."""
-    return blake2b(paths.encode(), digest_size=6).hexdigest() if paths else None
+    return blake2b(svg.encode(), digest_size=6).hexdigest() if svg else None
 
 
 # --- what is wrong --------------------------------------------------------------------------------
 
 # Causes on the card of a site.
-MAX_CAUSES: Final = 2
+MAX_CAUSES: Final = 3
 
 
 def causes(alarms: Iterable[Mapping[str, Any]]) -> tuple[dict[str, Any], ...]:
@@ -156,7 +154,7 @@ class Site:
     with every row; `heartbeat_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns`
     is when the twin received its newest row, by the clock of its machine. `verdict` and
     `active_alarms`, without shelved ones, are None until they are computed; `causes` is from
-    `causes`; `alarms` are the worst active ones, as in `/api/alarms`. `dots` draw its map;
+    `causes`; `alarms` are the worst active ones, as in `/api/alarms`. `dots` is its map;
     `notes` is the number of notes.
     """
 

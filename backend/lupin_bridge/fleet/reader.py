@@ -115,7 +115,7 @@ def latest(known_map: int, frame_id: str, reader: LogReader) -> Reported:
     log = reader.connection
     every = runs(log.execute)
     span = span_at(every, FOREVER_NS)
-    is_wall_clock = span is None or not span.run.begun.is_simulated
+    is_wall_clock = span is None or not span.is_simulated
     (now_ns,) = log.execute(
         "SELECT CAST(extract(epoch FROM now()) * 1000000000 AS BIGINT)"
     ).fetchone()
@@ -147,7 +147,8 @@ def _newer_map(log: SiteLog, known: int) -> tuple[int, OccupancyMap | None]:
 class ArchiveRecall(Recall):
     """Queries the archive, each query in a transaction, over pooled connections."""
 
-    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+    def answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        """See `Recall`."""
         try:
             connection = self._connection()
             try:

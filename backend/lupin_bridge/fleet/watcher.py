@@ -327,7 +327,7 @@ class Watcher:
 
     def _read(self, log: Any, judged: _Judged) -> None:
         span = span_at(runs(log.execute), FOREVER_NS)
-        judged.is_simulated = span is not None and span.run.begun.is_simulated
+        judged.is_simulated = span is not None and span.is_simulated
         found = state_at(log, FOREVER_NS, "")
         before = judged.snapshot
         # Unchanged tags are not judged a second time.
@@ -404,7 +404,8 @@ class WatchChild(Child):
 
 
 class _WithoutJournal(Recall):
-    def _answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+    def answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        """See `Recall`."""
         return query(None, is_abandoned)
 
 

@@ -87,6 +87,18 @@ def says_day(light_lx: float | None) -> bool | None:
     return light_lx >= DAY_FROM_LX
 
 
+def light_after(
+    said: bool | None, light_ns: int, stamp_ns: int, light_lx: float | None
+) -> tuple[bool | None, int]:
+    """What a tag's light sensor says after one more scan, and the stamp of its last reading.
+
+    Before, it said `said`, by a reading of `light_ns`. `light_lx` None: the scan left it out.
+    """
+    if light_lx is not None:
+        return says_day(light_lx), stamp_ns
+    return None if stamp_ns - light_ns > LEFT_OUT_NS else said, light_ns
+
+
 def nights_by_light(
     readings: Iterable[tuple[int, float]], end_ns: int
 ) -> Sequence[tuple[int, int]] | None:
@@ -122,15 +134,6 @@ class Light:
     def is_day(self) -> bool | None:
         """Whether at least half of the sensors say that it is day; None: there are none."""
         return 2 * self._bright >= len(self._is_bright) if self._is_bright else None
-
-
-def judge_day(light: bool | None, clock: ClockDay | None, now_s: float | None) -> Day:
-    """Decide by the light; if that is None, by the clock at `now_s` (Unix time)."""
-    if light is not None:
-        return Day(light, "light")
-    if clock is not None and now_s is not None:
-        return Day(clock.is_day(now_s), "clock")
-    return Day(True, "assumed")
 
 
 # From a moment on (ns of ROS time), a tag's light sensor says day, night, or nothing.

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Final
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day, judge_day
+from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.judge.scans import (
     SHORTEST_NS,
@@ -71,8 +71,11 @@ class Criteria:
         return holds_ns(interval_ns(scans_ns))
 
     def day(self, light: bool | None, stamp_ns: int) -> Day:
-        """Whether it was day at a moment of ROS time; `light` is what the light said, or None."""
-        return judge_day(light, self.clock, unix_s(stamp_ns))
+        """Whether it was day at a moment of ROS time: by the light; if that is None, the clock."""
+        if light is not None:
+            return Day(light, "light")
+        now_s = unix_s(stamp_ns)
+        return Day(True, "assumed") if now_s is None else Day(self.clock.is_day(now_s), "clock")
 
     def is_day(self, stamp_ns: int) -> bool:
         """Whether it was day by the clock alone."""
@@ -229,9 +232,8 @@ class Judge:
         # The last known time: a simulation stops its clock before it starts anew.
         self._known_ns = 0
         self._waiting: dict[str, None] = {}
-        self._counts = Counter[Verdict]()
-        self._overdue = 0
-        self._once = 0
+        # Of all tags, as of the last change of any.
+        self._counts, self._overdue = Counter[Verdict](), 0
         self._judged = NOTHING_JUDGED
         self._changed: Mapping[str, Mapping[str, int]] = {}
         self._days: Mapping[str, Sequence[Reading]] = {}
@@ -307,7 +309,7 @@ class Judge:
             there = {tag.tag_id for tag in snapshot.tags}
             gone = [tag_id for tag_id in self._tags if tag_id not in there]
         for tag_id in gone:
-            self._once -= self._tags.pop(tag_id).is_once
+            del self._tags[tag_id]
             self._recent.forget(tag_id)
         self._seen = snapshot.tags
         return news, gone
@@ -341,9 +343,7 @@ class Judge:
             return _UNKNOWN
         recent, by = self._recent.tag(tag_id), self.criteria
         holds = kept.holds_ns = by.holds_ns(recent.stamps_ns)
-        was_once = kept.is_once
         kept.is_once = len(recent.stamps_ns) == 1 and by.recent_s is None
-        self._once += kept.is_once - was_once
         health = judge_tag(
             kept.state,
             now_ns,
@@ -376,18 +376,13 @@ class Judge:
         before = self._judged
         tags = before.tags
         if changed or gone:
-            self._counts.subtract(
-                tags[tag_id].verdict for tag_id in (*changed, *gone) if tag_id in tags
-            )
-            self._counts.update(health.verdict for health in changed.values())
-            self._overdue += sum(map(is_overdue, changed.values())) - sum(
-                is_overdue(tags[tag_id]) for tag_id in (*changed, *gone) if tag_id in tags
-            )
             tags = {**tags, **changed}
             for tag_id in gone:
                 tags.pop(tag_id, None)
+            self._counts = Counter(health.verdict for health in tags.values())
+            self._overdue = sum(map(is_overdue, tags.values()))
         patrol = self._recent.patrol(now_ns or self._now_ns, self._overdue)
-        once = self._once if self.knows_recent else 0
+        once = sum(kept.is_once for kept in self._tags.values()) if self.knows_recent else 0
         stop = stopped(patrol.last_scan_ns, now_ns, once, len(tags))
         house = judge_site(self._counts, is_silent=now_ns is None, stopped=stop)
         is_same = (house, day, patrol) == (before.house, before.day, before.patrol)

@@ -18,7 +18,7 @@ from itertools import chain, groupby, takewhile
 from operator import attrgetter, itemgetter
 from typing import Any, Final
 
-from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, SINCE_NS, Day, Light, says_day
+from lupin_bridge.judge.day import LIGHT, SINCE_NS, Day, Light, light_after
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.past import (
     SILENCE_NS,
@@ -213,13 +213,10 @@ class Recent:
 
     def day_at(self, at_ns: int) -> bool | None:
         """What the light said at a moment; None: scans left it out for long, or never had it."""
-        by_then = self.scans[: bisect_right(self.scans, at_ns, key=_stamp_ns)]
-        for scan in reversed(by_then):
-            if by_then[-1].stamp_ns - scan.stamp_ns > LEFT_OUT_NS:
-                break
-            if LIGHT in scan.values:
-                return says_day(scan.values[LIGHT])
-        return None
+        says, light_ns = None, 0
+        for scan in self.scans[: bisect_right(self.scans, at_ns, key=_stamp_ns)]:
+            says, light_ns = light_after(says, light_ns, scan.stamp_ns, scan.values.get(LIGHT))
+        return says
 
     def species_at(self, at_ns: int) -> str:
         """The last species until then that the camera was sure of; empty: none."""
@@ -370,11 +367,7 @@ def light_turns(scans: Iterable[PastWrite]) -> Iterator[PastWrite]:
     said: dict[str, tuple[bool | None, int]] = {}
     for scan in scans:
         before, light_ns = said.get(scan.tag_id, (None, 0))
-        if LIGHT in scan.sensors:
-            says: bool | None = says_day(scan.values[scan.sensors.index(LIGHT)])
-            said[scan.tag_id] = says, scan.stamp_ns
-        else:
-            says = None if scan.stamp_ns - light_ns > LEFT_OUT_NS else before
-            said[scan.tag_id] = says, light_ns
-        if says is not before:
+        light = dict(zip(scan.sensors, scan.values, strict=True)).get(LIGHT)
+        said[scan.tag_id] = light_after(before, light_ns, scan.stamp_ns, light)
+        if said[scan.tag_id][0] is not before:
             yield scan

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import attrgetter
 
-from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Turn, says_day
+from lupin_bridge.judge.day import LIGHT, Turn, light_after
 from lupin_bridge.judge.episodes import TagEpisodes, readings_of
 from lupin_bridge.judge.quantities import IsDay
 from lupin_bridge.judge.scans import INTERVALS, SHORTEST_NS
@@ -57,12 +57,9 @@ class Trail:
         stamp_ns, gaps, turns = writes[0].stamp_ns, self.gaps, self.turns
         if self.scans_ns and matters(self.scans_ns[-1], stamp_ns, self.holds_ns):
             gaps = (*gaps, Gap(self.scans_ns[-1], stamp_ns, self.holds_ns))
-        said, light_ns = turns[-1][1] if turns else None, self.light_ns
+        said = turns[-1][1] if turns else None
         light = next((reading.value for reading in readings if reading.name == LIGHT), None)
-        if light is not None:
-            says, light_ns = says_day(light), stamp_ns
-        else:
-            says = None if stamp_ns - light_ns > LEFT_OUT_NS else said
+        says, light_ns = light_after(said, self.light_ns, stamp_ns, light)
         if says is not said:
             turns = (*turns, (stamp_ns, says))
         scans_ns = (*self.scans_ns, stamp_ns)[-INTERVALS - 1 :]

@@ -94,7 +94,7 @@ class PageText:
         # Rows omit the date of the first day.
         day, comma, _ = at(body["from"]).rpartition(", ")
         self._day = f"{day}{comma}"
-        period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
+        period = say("period", **{"from": at(body["from"]), "to": self._clock(body["to"])})
         heading = f"{say('title')}: {site}" if site else say("title")
         hint = self.words["hints"].get(origin)
         known = [
@@ -189,7 +189,7 @@ class PageText:
     def _alarm(self, entry: Entry, heading: str) -> Entry:
         """The cells of a row, by their columns; its status is that of its worst value.
 
-        Below a heading, it does not repeat the cause.
+        Below a heading, it has its tag where others have their cause.
         """
         reason, own = entry["reason"], [entry, *entry["also"]]
         sensor, limit = reason["sensor"], reason["limit"]
@@ -205,14 +205,14 @@ class PageText:
         ):
             lasted_s += max(0, to_s - max(from_s, last_s))
             last_s = max(to_s, last_s)
-        cause, times = self._cause([entry]), f"{len(mine)}×" if len(mine) > 1 else ""
+        cause, times = self._cause([entry]), f" ({len(mine)}×)" if len(mine) > 1 else ""
         worst = f"{worst} ({verdict})" if worst else verdict
         if (heading or cause) != self._what(reason):
             worst = f"{self._label(sensor)} {worst}"
         return {
             "reason": reason,
-            "alarm": times if heading else f"{cause} {times}".strip(),
-            "point": entry["tag_id"] or self.say("house"),
+            "alarm": f"{self._where(entry['tag_id']) if heading else cause}{times}",
+            "point": "" if heading else entry["tag_id"] or self.say("house"),
             "when": self._clock(min((it["raised_at"] for it in own), key=itemgetter("sec"))),
             "end": self._clock(max(ends, key=itemgetter("sec"))) if ends else "",
             "length": self._length(lasted_s) if ends else "",
@@ -226,8 +226,7 @@ class PageText:
         def extreme(found: Entry | None) -> Iterable[str]:
             if found is None:
                 return ("", "")
-            where = f"{self._where(found['tag_id'])}, {self._clock(found['stamp'])}"
-            return number(found["value"]), where
+            return number(found["value"]), f"{found['tag_id']}, {self._clock(found['stamp'])}"
 
         return (
             self._label(of["sensor_type"]),
@@ -280,7 +279,10 @@ class PageText:
         columns: Sequence[str],
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
-        """A table of entries by heading, "" for none; a column ending with `*` has numbers."""
+        """A table of entries by heading, "" for none; a column ending with `*` has numbers.
+
+        Below a heading, the first cell takes the room of the second, which is empty.
+        """
         kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
         head = f"<h2>{escape(self.say(title))}</h2>"
         if not any(groups.values()):
@@ -297,7 +299,10 @@ class PageText:
             for entry in entries:
                 is_critical = entry.get("reason", {}).get("verdict") == "critical"
                 rows += '<tr class="critical">' if is_critical else "<tr>"
-                for cell, kind in zip(cells(entry), kinds, strict=True):
+                first, *others = zip(cells(entry), kinds, strict=True)
+                rows += '<td colspan="2">' if heading else "<td>"
+                rows += f"{escape(first[0])}</td>"
+                for cell, kind in others[bool(heading) :]:
                     rows += f"<td{kind}>{escape(cell)}</td>"
                 rows += "</tr>"
             rows += "</tbody>"

@@ -15,6 +15,7 @@ from typing import Any, Final, TypeVar, cast
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 from starlette.requests import ClientDisconnect, HTTPConnection
 from starlette.types import Receive, Scope, Send
@@ -26,7 +27,7 @@ from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
 from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, StateQuery, answered
-from lupin_bridge.query_string import matches
+from lupin_bridge.query_string import NoParameters, matches, parameters_of, read
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable
@@ -76,12 +77,41 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 RouteT = TypeVar("RouteT", bound=Callable[..., Any])
 
 
-def read_route(router: APIRouter, path: str, **documentation: Any) -> Callable[[RouteT], RouteT]:
-    """Register a function for GET and, undocumented, for HEAD (the server drops the body)."""
+class ApiRoute(APIRoute):
+    """A route below `/api/` refuses parameters of the query, but for those that it describes.
+
+    A route with some parses them itself, by `query_string.read`. Pages and probes ignore all.
+    """
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """See `APIRoute`."""
+        handle = super().get_route_handler()
+        if "parameters" in (self.openapi_extra or {}) or not self.path.startswith("/api/"):
+            return handle
+
+        async def without_parameters(request: Request) -> Response:
+            read(NoParameters, request.query_params.multi_items())
+            return await handle(request)
+
+        return without_parameters
+
+
+def read_route(
+    router: APIRouter, path: str, query: type[Any] | None = None, **documentation: Any
+) -> Callable[[RouteT], RouteT]:
+    """Register a function for GET and, undocumented, for HEAD (the server drops the body).
+
+    `query` has the parameters that the function reads.
+    """
+    if query is not None:
+        documentation["openapi_extra"] = {"parameters": parameters_of(query)}
+    own = documentation.get("openapi_extra")
 
     def register(function: RouteT) -> RouteT:
         router.get(path, response_class=Response, **documentation)(function)
-        router.head(path, response_class=Response, include_in_schema=False)(function)
+        router.head(path, response_class=Response, include_in_schema=False, openapi_extra=own)(
+            function
+        )
         return function
 
     return register

@@ -19,11 +19,12 @@ from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
-from lupin_bridge.query_string import MAX_SECONDS, OfExport, parameters_of, read
+from lupin_bridge.query_string import MAX_SECONDS, OfExport, read
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
     NOT_REMEMBERED,
+    ApiRoute,
     bridge_of,
     client_left,
     error_response,
@@ -41,7 +42,7 @@ from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
-router = APIRouter()
+router = APIRouter(route_class=ApiRoute)
 
 _ANSWERS = {status: what for status, what in NOT_REMEMBERED.items() if status != 304}
 # Worst-case time to import a package, or to write a group of rows, s.
@@ -73,7 +74,7 @@ def _content(media_type: str) -> dict[str, Any]:
     "/api/export.csv",
     summary="Every reading and failed attempt of a period, as CSV",
     responses={200: _content(Csv.media_type), **_ANSWERS},
-    openapi_extra={"parameters": parameters_of(OfExport)},
+    query=OfExport,
 )
 async def csv_route(request: Request) -> Response:
     """One row for each reading, and one without a sensor for each attempt that got no reading.
@@ -92,7 +93,7 @@ async def csv_route(request: Request) -> Response:
         **_ANSWERS,
         **refusing({501: "the extra `science` is not installed"}),
     },
-    openapi_extra={"parameters": parameters_of(OfExport)},
+    query=OfExport,
 )
 async def parquet_route(request: Request) -> Response:
     """The columns of the CSV; `time` is a timestamp. Columns carry metadata."""

@@ -21,6 +21,7 @@ from lupin_bridge.query_string import AT, Name, needed, parameter, parameters_of
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     REFUSALS,
+    ApiRoute,
     bridge_of,
     json_response,
     list_header,
@@ -39,7 +40,7 @@ from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report
 
-router = APIRouter()
+router = APIRouter(route_class=ApiRoute)
 
 # Daily quantities change slowly: "now" is the last whole minute.
 _MINUTE_NS: Final = 60 * 1_000_000_000
@@ -244,7 +245,7 @@ class AdviceQuery(TagsQuery):
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
     responses={**NOT_REMEMBERED, 200: {"model": pollers.EstimateQualities}},
-    openapi_extra={"parameters": parameters_of(QualityQuery)},
+    query=QualityQuery,
 )
 async def quality(request: Request) -> Response:
     """Each new scan is compared with a prediction from what was known before it.
@@ -262,7 +263,7 @@ async def quality(request: Request) -> Response:
     "/api/estimate/tags",
     summary="The expected value of each tag's newest reading, and which tags have changed",
     responses={**NOT_REMEMBERED, 200: {"model": pollers.ExpectedTags}},
-    openapi_extra={"parameters": parameters_of(TagsQuery)},
+    query=TagsQuery,
 )
 async def tags(request: Request) -> Response:
     """Predicted from all other tags, and from the tag's own readings except the latest ones."""
@@ -275,7 +276,7 @@ async def tags(request: Request) -> Response:
     "/api/estimate/advice",
     summary="Where an additional tag would help the estimate most",
     responses={**NOT_REMEMBERED, 200: {"model": pollers.Advice}},
-    openapi_extra={"parameters": parameters_of(AdviceQuery)},
+    query=AdviceQuery,
 )
 async def advice(request: Request) -> Response:
     """Places on the map's free floor, the best first.

@@ -1,14 +1,13 @@
-"""The bridge's own pages: sign-in, `/docs`, `/openapi.json`, the guide, and `/` without the HMI."""
+"""The bridge's own pages: sign-in, `/openapi.json`, the guide, and `/` without the HMI."""
 
 from __future__ import annotations
 
-import re
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -18,11 +17,11 @@ from starlette.types import Scope
 
 from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
-from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.field import listed
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
+    ApiRoute,
     computed,
     error_response,
     json_response,
@@ -36,7 +35,7 @@ from lupin_bridge.routes.answers import (
 from lupin_bridge.serving.admission import REVALIDATE
 from lupin_bridge.stream import routes_schema
 
-router = APIRouter()
+router = APIRouter(route_class=ApiRoute)
 # In the application only where the page was not built.
 no_page_router = APIRouter()
 
@@ -44,7 +43,10 @@ no_page_router = APIRouter()
 _WRITE_S: Final = 0.02
 
 GUIDE_PATH: Final = "/docs/guide"
-_NO_GUIDE: Final = "the guide was not built: run `make docs` in the clone, or install a release"
+_NO_GUIDE: Final = (
+    "the guide was not built: run `make docs` in the clone, or install a release; "
+    "/openapi.json has all routes"
+)
 # The guide's theme has inline styles; scripts are files, as everywhere.
 _GUIDE_POLICY: Final = f"{CONTENT_POLICY}; style-src 'self' 'unsafe-inline'"
 
@@ -58,6 +60,7 @@ HOW_TO_BUILD: Final = (
 async def openapi(request: Request) -> Response:
     """The OpenAPI document."""
     app, prefix = request.app, request.scope.get("root_path", "")
+    key = f"openapi {prefix}"
 
     def write() -> bytes:
         document = app.openapi()
@@ -65,78 +68,14 @@ async def openapi(request: Request) -> Response:
             document = {**document, "servers": [{"url": prefix}]}
         return orjson.dumps(document, option=orjson.OPT_INDENT_2)
 
-    return await _written_once(request, f"openapi {prefix}", write, "application/json")
-
-
-@read_route(router, "/docs", include_in_schema=False)
-async def docs(request: Request) -> Response:
-    """The OpenAPI document for people."""
-    app, base_url = request.app, str(request.base_url).rstrip("/")
-
-    def write() -> bytes:
-        return render(app.openapi(), base_url).encode()
-
-    return await _written_once(request, f"docs {base_url}", write, "text/html; charset=utf-8")
-
-
-async def _written_once(
-    request: Request, key: str, write: Callable[[], bytes], media_type: str
-) -> Response:
-    bridge: Bridge | None = request.app.state.bridge
-    if bridge is None:
-        return Response(write(), headers=REVALIDATE, media_type=media_type)
-
+    if app.state.bridge is None:
+        return Response(write(), headers=REVALIDATE, media_type="application/json")
     return await respond(
         request,
         key,
-        lambda: computed(request, key, write, media_type, cost_s=_WRITE_S, headers=REVALIDATE),
-    )
-
-
-def render(document: dict[str, Any], base_url: str) -> str:
-    """The routes of an OpenAPI document as one HTML page, with parameters and lines for curl."""
-    info = document["info"]
-    title = f"{escape(info['title'])}: API"
-    routes = "".join(
-        _route(f"{method.upper()} {path}", operation, base_url)
-        for path, methods in document["paths"].items()
-        for method, operation in methods.items()
-    )
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width">'
-        f'<title>{title}</title><link rel="stylesheet" href="docs.css"></head><body>'
-        f"<h1>{title}</h1><p>{_prose(info['summary'])}</p>"
-        f"<p>{_prose(info['description'])}</p>"
-        '<p>With all types, for tools: <a href="openapi.json">/openapi.json</a></p>'
-        '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
-        f"<h2>Routes</h2>{routes}</body></html>"
-    )
-
-
-def _prose(text: str) -> str:
-    """Text as HTML; what is between backticks is code."""
-    return re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
-
-
-def _route(name: str, operation: dict[str, Any], base_url: str) -> str:
-    method, _, path = name.partition(" ")
-    parameters = operation.get("parameters", [])
-    required = [p for p in parameters if p.get("required") and p["in"] == "query"]
-    query = "&".join(f"{p['name']}=…" for p in required)
-    rows = "".join(
-        f"<tr><td><code>{escape(p['name'])}</code></td><td>{escape(p['schema'].get('type', ''))}"
-        f"{' (required)' if p.get('required') else ''}</td>"
-        f"<td>{_prose(p.get('description', ''))}</td></tr>"
-        for p in parameters
-    )
-    url = f"{base_url}{path}{'?' + query if query else ''}"
-    return (
-        f"<section><h3><code>{escape(name)}</code></h3>"
-        f"<p>{_prose(operation.get('summary', ''))}. {_prose(operation.get('description', ''))}</p>"
-        f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
-        + (f"<table>{rows}</table>" if rows else "")
-        + "</section>"
+        lambda: computed(
+            request, key, write, "application/json", cost_s=_WRITE_S, headers=REVALIDATE
+        ),
     )
 
 
@@ -150,10 +89,20 @@ class _Guide(StaticFiles):
         return response
 
 
+@read_route(router, "/docs", include_in_schema=False)
+async def docs(request: Request) -> Response:
+    """The routes, in the guide."""
+    return _to_guide(request, "reference/http.html")
+
+
 @read_route(router, GUIDE_PATH, include_in_schema=False)
 async def to_guide(request: Request) -> Response:
     """The documentation, as HTML."""
-    return RedirectResponse(f"{request.scope.get('root_path', '')}{GUIDE_PATH}/")
+    return _to_guide(request)
+
+
+def _to_guide(request: Request, page: str = "") -> Response:
+    return RedirectResponse(f"{request.scope.get('root_path', '')}{GUIDE_PATH}/{page}")
 
 
 async def _no_guide(_request: Request) -> Response:
@@ -284,7 +233,6 @@ def _add_file(name: str, media_type: str) -> None:
 
 _add_file("signin.css", "text/css; charset=utf-8")
 _add_file("signin.js", "text/javascript; charset=utf-8")
-_add_file("docs.css", "text/css; charset=utf-8")
 
 
 @read_route(router, "/font.woff2", include_in_schema=False)

@@ -25,10 +25,11 @@ from lupin_bridge.past.plans import (
 )
 from lupin_bridge.past.report import Report
 from lupin_bridge.past.report_page import ReportPage
-from lupin_bridge.query_string import parameter, parameters_of, read
+from lupin_bridge.query_string import parameter, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NOT_REMEMBERED,
+    ApiRoute,
     bridge_of,
     error_response,
     json_response,
@@ -62,7 +63,7 @@ class ListenQuery:
         return 1.0 / self.max_rate_hz
 
 
-router = APIRouter()
+router = APIRouter(route_class=ApiRoute)
 
 # How long the ages of an answer may be reused: they are shown in seconds.
 AGES_HOLD_S: Final = 0.2
@@ -89,7 +90,7 @@ async def ws_state(websocket: WebSocket) -> None:
     "/api/state",
     summary="The current state of every tag",
     responses={200: {"model": schema.TwinState}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
+    query=query_string.OfMoment,
 )
 async def state(request: Request) -> Response:
     """The newest TwinState, with the message's own field names, and ages at the time of the answer.
@@ -136,7 +137,7 @@ async def history(request: Request, tag_id: str) -> Response:
     "/api/tags/{tag_id:path}",
     summary="One tag",
     responses={200: {"model": schema.TwinTagState}, **NOT_REMEMBERED, **_NO_TAG},
-    openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
+    query=query_string.OfMoment,
 )
 async def tag(request: Request, tag_id: str) -> Response:
     """Everything that the twin knows about one tag or, with `at`, knew at that moment."""
@@ -167,7 +168,7 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     "/api/history",
     summary="The readings of one sensor of one tag over a period",
     responses={200: {"model": routes_schema.History}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(query_string.OfHistory)},
+    query=query_string.OfHistory,
 )
 async def history_route(request: Request) -> Response:
     """Readings, or equal buckets if there are more than `points`; `gaps`: without readings."""
@@ -185,7 +186,7 @@ async def history_route(request: Request) -> Response:
     "/api/timeline",
     summary="Events over time: scans, failures, inspections, pests, silences, runs of the clock",
     responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(query_string.OfTimeline)},
+    query=query_string.OfTimeline,
 )
 async def timeline_route(request: Request) -> Response:
     """Events counted in buckets of equal length, and how far back the journal reaches."""
@@ -202,7 +203,7 @@ async def timeline_route(request: Request) -> Response:
     "/api/report",
     summary="Report of a period: alarms, notes, silences, extremes, scans",
     responses={200: {"model": routes_schema.ShiftReport}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(query_string.OfReport)},
+    query=query_string.OfReport,
 )
 async def report_route(request: Request) -> Response:
     """At most 31 days, 100,000 scans and inspections, and 500 entries in each list."""
@@ -215,7 +216,7 @@ async def report_route(request: Request) -> Response:
     "/api/report.html",
     summary="The same report as an A4 page for printing",
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(query_string.OfReportPage)},
+    query=query_string.OfReportPage,
 )
 async def report_page_route(request: Request) -> Response:
     """The page has no scripts."""

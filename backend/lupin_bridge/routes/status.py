@@ -18,10 +18,11 @@ from lupin_bridge.feed.source import ailment
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past.plans import Health
-from lupin_bridge.query_string import parameters_of, read
+from lupin_bridge.query_string import read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NOT_REMEMBERED,
+    ApiRoute,
     bridge_of,
     computed,
     error_response,
@@ -88,7 +89,7 @@ def map_png(occupancy: OccupancyMap) -> bytes:
     return buffer.getvalue()
 
 
-router = APIRouter()
+router = APIRouter(route_class=ApiRoute)
 
 # Rough worst-case time to draw a cell, s.
 _DRAW_CELL_S: Final = 50e-9
@@ -184,7 +185,7 @@ _WRITE_ALARM_S: Final = 10e-6
         200: {"model": schema.Judgement},
         **refusing({503: "no twin has been found yet, or it is busy"}),
     },
-    openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
+    query=query_string.OfMoment,
 )
 async def health(request: Request) -> Response:
     """The verdicts, as in the frames of `/ws/state`, with the reasons for each.
@@ -225,7 +226,7 @@ async def sensors(request: Request) -> Response:
     "/api/alarms",
     summary="Alarms: what was wrong, where, from when to when, and the worst value",
     responses={200: {"model": schema.Alarms}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(query_string.OfAlarms)},
+    query=query_string.OfAlarms,
 )
 async def alarms_route(request: Request) -> Response:
     """Alarms that were active at any time in the period, newest first, at most 2,000.

@@ -25,11 +25,12 @@ from lupin_bridge.feed.source import ELSEWHERE, TwinUnavailableError
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.push import DeviceRefused, check_device
 from lupin_bridge.past.report_page import languages
-from lupin_bridge.query_string import OfNotes, moment, parameters_of, read
+from lupin_bridge.query_string import OfNotes, moment, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
+    ApiRoute,
     Refused,
     bridge_of,
     computed,
@@ -51,7 +52,7 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Reading, Scan
 
 log = logging.getLogger(__name__)
 
-router = APIRouter(default_response_class=Response)
+router = APIRouter(default_response_class=Response, route_class=ApiRoute)
 
 MAX_LISTED: Final = 2_000
 _TOO_MANY_NOTES: Final = f"written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute"
@@ -77,7 +78,7 @@ _WRITE_ANSWERS: Final = refusing(
     "/api/notes",
     summary="Notes of people about alarms, tags and the greenhouse",
     responses={200: {"model": routes_schema.Notes}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(OfNotes)},
+    query=OfNotes,
 )
 async def notes_route(request: Request) -> Response:
     """Newest first, at most 2,000, including withdrawn ones; the same in every replica."""

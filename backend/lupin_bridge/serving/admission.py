@@ -150,8 +150,8 @@ class Admission:
         self._limits = limits
         self._rate = RateLimit(limits.answers_per_s, limits.answers_per_s * BURST_S)
         self.in_flight: Counter[str] = Counter()
-        # By client: since when, s, and what breaks it off.
-        self._exports: dict[str, tuple[float, Callable[[], None]]] = {}
+        # The exports being sent, by client: since when, s, and what breaks it off.
+        self.exports: dict[str, tuple[float, Callable[[], None]]] = {}
         total = limits.total_concurrency
         self._computing = _Places(total)
         self._large = _Places(total - total // 4)
@@ -190,11 +190,6 @@ class Admission:
         finally:
             _give_back(self.in_flight, client)
 
-    @property
-    def exporting(self) -> int:
-        """How many exports are being sent now."""
-        return len(self._exports)
-
     @contextmanager
     def export(self, client: str, now_s: float, end: Callable[[], None]) -> Iterator[None]:
         """A client's export, from its first row to its last; `end` breaks it off.
@@ -206,22 +201,22 @@ class Admission:
             BusyError: all slots are taken, and no export is old.
 
         """
-        if client in self._exports:
+        if client in self.exports:
             self.refused["client_exports"] += 1
             raise ClientLimitError(f"{client} has 1 export under way, the limit", 5.0)
-        if len(self._exports) >= EXPORTS:
-            oldest, (since_s, end_oldest) = next(iter(self._exports.items()))
+        if len(self.exports) >= EXPORTS:
+            oldest, (since_s, end_oldest) = next(iter(self.exports.items()))
             if now_s - since_s < LONG_EXPORT_S:
                 self.refused["total_exports"] += 1
                 raise BusyError(f"{EXPORTS} exports are under way, the limit", 5.0)
-            del self._exports[oldest]
+            del self.exports[oldest]
             end_oldest()
-        entry = self._exports[client] = now_s, end
+        entry = self.exports[client] = now_s, end
         try:
             yield
         finally:
-            if self._exports.get(client) is entry:
-                del self._exports[client]
+            if self.exports.get(client) is entry:
+                del self.exports[client]
 
     @contextmanager
     def computing(self, client: str, *, is_large: bool = False) -> Iterator[int]:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final, Protocol
+from dataclasses import dataclass, field
+from typing import Final, Literal, Protocol
 
 import orjson
 
@@ -90,6 +90,10 @@ def next_beat_s(due_s: float, now_s: float, interval_s: float) -> float:
     return max(due_s, now_s - BEAT_SLACK * interval_s) + interval_s
 
 
+# Frames beside those of the state.
+Beside = Literal["alarms", "robot"]
+
+
 class Writable(Protocol):
     """What the hub needs of a connection; `ws_protocol.Connection` is one."""
 
@@ -132,9 +136,8 @@ class Client:
     sent_seq: int = 0
     next_due_s: float = 0.0
     status_due: bool = True
-    alarms_due: bool = True
-    # A client that wants alarms gets the robot too, at its rate of states.
-    robot_due: bool = True
+    # Kinds of frames beside the state, that it lacks; `Hub.publish_beside` adds to them.
+    beside_due: set[str] = field(default_factory=set)
     robot_next_s: float = 0.0
     written_s: float = 0.0
     blocked_since_s: float | None = None
@@ -157,8 +160,7 @@ class Hub:
         self.unsent = Unsent()
         self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
-        self._alarms: bytes | None = None
-        self._robot: bytes | None = None
+        self._beside: dict[str, bytes] = {}
         self._status_at = status_at
         self._status_wire: bytes | None = None
         self._status_wire_s = 0.0
@@ -205,6 +207,7 @@ class Hub:
     def join(self, client: Client, now_s: float) -> None:
         """Add a client and give it the status and the current state at once, in that order."""
         self._clients[client] = None
+        client.beside_due = {*self._beside}
         self._parties[client.address] += 1
         self.serve(client, now_s)
 
@@ -253,18 +256,14 @@ class Hub:
             if now_s >= client.written_s + silence_s:
                 client.status_due = True
 
-    def publish_alarms(self, wire: bytes, now_s: float) -> None:
-        """Send this frame of changed alarms to every client that can take it."""
-        self._alarms = wire
-        for client in self._clients:
-            client.alarms_due = True
-        self.serve_all(now_s)
+    def publish_beside(self, kind: Beside, wire: bytes, now_s: float) -> None:
+        """Send this changed frame to every client that wants alarms, and can take it.
 
-    def publish_robot(self, wire: bytes, now_s: float) -> None:
-        """Send this frame of changed robot data to every client that can take it."""
-        self._robot = wire
+        A client gets the robot's at its rate of states.
+        """
+        self._beside[kind] = wire
         for client in self._clients:
-            client.robot_due = True
+            client.beside_due.add(kind)
         self.serve_all(now_s)
 
     def serve_all(self, now_s: float) -> None:
@@ -286,15 +285,14 @@ class Hub:
         # Only after a state, so that the client knows the alarms' tags and the time for ages.
         if not (client.wants_alarms and client.sent_seq):
             return
-        if client.alarms_due and self._alarms is not None and self._can_take(client, now_s):
-            self._write(client, self._alarms, now_s)
-            client.alarms_due = False
-        if not client.robot_due or self._robot is None or now_s < client.robot_next_s:
-            return
-        if self._can_take(client, now_s):
-            self._write(client, self._robot, now_s)
-            client.robot_due = False
-            client.robot_next_s = now_s + client.min_interval_s
+        for kind in sorted(client.beside_due):
+            if kind == "robot" and now_s < client.robot_next_s:
+                continue
+            if self._can_take(client, now_s):
+                self._write(client, self._beside[kind], now_s)
+                client.beside_due.discard(kind)
+                if kind == "robot":
+                    client.robot_next_s = now_s + client.min_interval_s
 
     def _serve_state(self, client: Client, now_s: float) -> None:
         frame = self._frame

@@ -304,4 +304,4 @@ class RobotPoller(Periodic):
             return
         if reported is not None and self.log.take(reported, now_ns):
             frame = orjson.dumps({"type": "robot", **_now(self.log.now)})
-            self._hub.publish_robot(text_frame(frame), self._clock())
+            self._hub.publish_beside("robot", text_frame(frame), self._clock())

@@ -4,7 +4,7 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, IN_FAHRENHEIT, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, causeWords, countsText, filtered, tagsText } from './arrange';
+import { alarmsCsv, arranged, causeWords, filtered, tagsText } from './arrange';
 import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import { inOrder, listOf } from './list';
 import { partsText, type Now } from './words';
@@ -110,17 +110,6 @@ test('of one cause, each area stands by itself, and is found by its name', () =>
   expect(filtered(list, 'south', sensors, isTag).active).toHaveLength(6);
 });
 
-test('of a cause how many are how bad', () => {
-  const items = listOf([cold(1), cold(2)], NO_LOCAL_ALARMS, null, AT);
-  const now = ({ id }: Alarm): Now => ({
-    ...{ kind: 'known', value: 10.4, reason: null, trend: null },
-    verdict: id === 'cold2' ? 'stressed' : 'healthy',
-  });
-  expect(countsText(items.active, now)).toBe('1 stressed, 1 back to normal');
-  const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
-  expect(countsText(items.active, unknown), 'no word for all alike').toBe('');
-});
-
 test('the newest first, or by tag: in one row', () => {
   const items = active(cold(10), hot(2), cold(3));
   const tags = (order: 'newest' | 'tag') =>
@@ -173,7 +162,7 @@ test.each([
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {
   const evil = alarm('a', { tag_id: '=1+1', raised: 0, worst: 4.2 });
-  const local = shelve(NO_LOCAL_ALARMS, evil, AT + 60_000, 'fan, off');
+  const local = shelve(NO_LOCAL_ALARMS, [{ alarm: evil }], AT + 60_000, 'fan, off');
   const list = listOf([evil, alarm('b', { cleared: 960 })], local, 1_000, AT);
   const [head, shelved, resolved] = alarmsCsv(list, IN_FAHRENHEIT, () => null)
     .slice(1)

@@ -1,7 +1,7 @@
 /** Views of the alarm list: filtered, sorted, grouped by cause and area, or as CSV. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
-import { airOf, isOfRange, nameOf, sideOf, VERDICTS } from '../domain/health';
+import { airOf, isOfRange, nameOf, sideOf } from '../domain/health';
 import { groupedBy } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
@@ -9,7 +9,7 @@ import { compareIds } from '../domain/twin';
 import { toShown } from '../domain/format';
 import { S } from '../strings';
 import { causeOf, inEach, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
-import { nameText, reasonNow, whatText, worstOf, type Now } from './words';
+import { nameText, whatText, worstOf, type Now } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** "cause" puts the worst first. */
@@ -105,21 +105,6 @@ export function tagsText(ids: readonly string[]): string {
   const count = ids.length <= MOST_NAMED + 1 ? ids.length : MOST_NAMED;
   const named = ids.slice(0, count).map((id) => shown(id, 16));
   return S.alarmTags(named, ids.length - count);
-}
-
-/** How many active alarms have each verdict now; empty if all have the same one. */
-export function countsText(items: readonly Item[], nowOf: (alarm: Alarm) => Now | null): string {
-  const active = items.filter(({ alarm }) => alarm.cleared_at === null);
-  // As in its row: an alarm without a value keeps its verdict.
-  const verdicts = active.map(({ alarm }) => reasonNow(alarm, nowOf(alarm)).verdict);
-  const counts = VERDICTS.flatMap((verdict) => {
-    const count = verdicts.filter((each) => each === verdict).length;
-    if (count === 0) return [];
-    const word =
-      verdict === 'healthy' ? S.alarmBack : (count === 1 ? S.health : S.healthMany)[verdict];
-    return [`${count} ${word.toLowerCase()}`];
-  });
-  return counts.length > 1 ? counts.join(', ') : '';
 }
 
 const iso = (at: WireTime | null): string | null =>

@@ -28,11 +28,20 @@ export function selectNow(
 const reasonIn = (state: AppState, alarm: Alarm): HealthReason =>
   reasonNow(alarm, selectNow(state, alarm, null));
 
-/** The worst current verdict of some alarms; null: no alarms. */
-export function worstNow(state: AppState, items: readonly Item[]): Verdict | null {
+/** The current verdicts of some alarms, the worst first, and how many have each. */
+export function countsNow(
+  state: AppState,
+  items: readonly Item[],
+): readonly (readonly [Verdict, number])[] {
   const verdicts = items.map(({ alarm }) => reasonIn(state, alarm).verdict);
-  return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
+  return VERDICTS.map(
+    (each) => [each, verdicts.filter((it) => it === each).length] as const,
+  ).filter(([, count]) => count > 0);
 }
+
+/** The worst current verdict of some alarms; null: no alarms. */
+export const worstNow = (state: AppState, items: readonly Item[]): Verdict | null =>
+  countsNow(state, items)[0]?.[0] ?? null;
 
 /** What to do first about some alarms that share a cause, by their current values. */
 export function todoNow(state: AppState, items: readonly Item[]): string {

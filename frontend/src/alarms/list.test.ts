@@ -71,7 +71,7 @@ describe('acknowledged and shelved', () => {
   });
 
   test('what is shelved stands apart with its end, comes back then, or when it gets worse', () => {
-    const local = shelve(NO_LOCAL_ALARMS, mild.alarm, AT + 1_000, 'fan off');
+    const local = shelve(NO_LOCAL_ALARMS, [mild], AT + 1_000, 'fan off');
     const shown = list([mild.alarm], local);
     expect(shown.active).toEqual([]);
     expect(shown.shelved[0]?.shelf).toMatchObject({ until: AT + 1_000, reason: 'fan off' });
@@ -105,7 +105,7 @@ describe('news', () => {
 
   test('not what is acknowledged or shelved; what comes back from there is', () => {
     const mild = { alarm: a };
-    const local = shelve(NO_LOCAL_ALARMS, mild.alarm, AT + 1_000, 'fan off');
+    const local = shelve(NO_LOCAL_ALARMS, [mild], AT + 1_000, 'fan off');
     expect(newsIds(EMPTY_LIST, list([a], local))).toEqual([[], []]);
     expect(newsIds(EMPTY_LIST, list([a], acknowledge(NO_LOCAL_ALARMS, [mild], AT)))).toEqual([
       [],

@@ -27,7 +27,7 @@ const through = (local: LocalAlarms): LocalAlarms => {
 
 test('what was acknowledged, shelved and wished for comes back after a reload', () => {
   const acknowledged = acknowledge({ ...NO_LOCAL_ALARMS, sound: true }, [rated('a')], AT);
-  const local = shelve(acknowledged, rated('b').alarm, AT + 900_000, 'fan off');
+  const local = shelve(acknowledged, [rated('b')], AT + 900_000, 'fan off');
   expect(through(local)).toEqual(local);
 });
 
@@ -56,7 +56,7 @@ test('what was acknowledged long ago is forgotten, unless it is still listed', (
 });
 
 test('a shelf ends by itself, at its very moment', () => {
-  const local = shelve(NO_LOCAL_ALARMS, rated('a').alarm, AT + 1_000, '');
+  const local = shelve(NO_LOCAL_ALARMS, [rated('a')], AT + 1_000, '');
   expect(pruned(local, new Set(), AT + 999)).toBe(local);
   expect(pruned(local, new Set(), AT + 1_000).shelved.size).toBe(0);
   expect(nextEnd(local, AT)).toBe(AT + 1_000);

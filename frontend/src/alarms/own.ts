@@ -81,19 +81,23 @@ export const acknowledge = (
 
 export const shelve = (
   local: LocalAlarms,
-  alarm: Alarm,
+  items: readonly WithAlarm[],
   until: number,
   reason: string,
 ): LocalAlarms => ({
   ...local,
   shelved: new Map([
     ...local.shelved,
-    [faultKey(alarm), { verdict: alarm.reason.verdict, until, reason }],
+    ...items.map(
+      ({ alarm }) => [faultKey(alarm), { verdict: alarm.reason.verdict, until, reason }] as const,
+    ),
   ]),
 });
 
-const without = <Value>(map: ReadonlyMap<string, Value>, key: string): ReadonlyMap<string, Value> =>
-  new Map([...map].filter(([each]) => each !== key));
+const without = <Value>(
+  map: ReadonlyMap<string, Value>,
+  keys: readonly string[],
+): ReadonlyMap<string, Value> => new Map([...map].filter(([each]) => !keys.includes(each)));
 
 /** `local` without ended shelves and old acknowledgements of unlisted alarms; null: not known what is listed. */
 export function pruned(
@@ -201,18 +205,30 @@ export const acknowledgeAlarms = (items: readonly WithAlarm[]): void => {
   change('acknowledge', items.length, acknowledge(own.get(), items, timeOfDay()));
 };
 
-export const unacknowledgeAlarm = (alarm: Alarm): void => {
+export const unacknowledgeAlarms = (items: readonly WithAlarm[]): void => {
   const local = own.get();
-  change('unacknowledge', 1, { ...local, acknowledged: without(local.acknowledged, alarm.id) });
+  const acknowledged = without(
+    local.acknowledged,
+    items.map(({ alarm }) => alarm.id),
+  );
+  change('unacknowledge', items.length, { ...local, acknowledged });
 };
 
-export const shelveAlarm = (alarm: Alarm, minutes: number, reason: string): void => {
-  change('shelve', 1, shelve(own.get(), alarm, timeOfDay() + minutes * 60_000, reason));
+export const shelveAlarms = (
+  items: readonly WithAlarm[],
+  minutes: number,
+  reason: string,
+): void => {
+  change('shelve', items.length, shelve(own.get(), items, timeOfDay() + minutes * 60_000, reason));
 };
 
-export const unshelveAlarm = (alarm: Alarm): void => {
+export const unshelveAlarms = (items: readonly WithAlarm[]): void => {
   const local = own.get();
-  change('unshelve', 1, { ...local, shelved: without(local.shelved, faultKey(alarm)) });
+  const shelved = without(
+    local.shelved,
+    items.map(({ alarm }) => faultKey(alarm)),
+  );
+  change('unshelve', items.length, { ...local, shelved });
 };
 
 /** `now` with only those keys as before that the action changed and that nobody else has set since. */

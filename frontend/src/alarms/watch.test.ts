@@ -10,12 +10,12 @@ import {
   FORGET_MS,
   NO_LOCAL_ALARMS,
   own,
-  shelveAlarm,
+  shelveAlarms,
   startOwn,
-  unacknowledgeAlarm,
+  unacknowledgeAlarms,
   undo,
   UNDO_MS,
-  unshelveAlarm,
+  unshelveAlarms,
 } from './own';
 import { calling } from './list';
 import { alarmList, meanwhile, onNews, startAlarms, startMeanwhile } from './watch';
@@ -96,9 +96,9 @@ test('a worse alarm is announced again, acknowledged or not', () => {
 test('acknowledgements survive a reload, and own actions are not announced', () => {
   reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   acknowledgeAlarms([item('a')]);
-  shelveAlarm(item('b').alarm, 15, 'x');
+  shelveAlarms([item('b')], 15, 'x');
   expect(ids()).toEqual([]);
-  unshelveAlarm(item('b').alarm);
+  unshelveAlarms([item('b')]);
   expect(ids()).toEqual(['b']);
   stop();
   own.set(NO_LOCAL_ALARMS);
@@ -123,7 +123,7 @@ test('acknowledged long ago, a lasting alarm stays so while the list is not ther
 
 test('a shelved alarm returns when its time is over, and is announced', () => {
   reportAlarms(alarm('a'));
-  shelveAlarm(item('a').alarm, 15, 'x');
+  shelveAlarms([item('a')], 15, 'x');
   expect(alarmList.get().shelved).toHaveLength(1);
   vi.advanceTimersByTime(15 * 60_000 - 1);
   expect(ids()).toEqual([]);
@@ -141,23 +141,23 @@ test('each action can be undone for a while; another tab’s word ends that', ()
   undo();
   expect([ids(), lastAction.get()]).toEqual([['a', 'b'], null]);
   acknowledgeAlarms([item('a')]);
-  shelveAlarm(item('b').alarm, 15, 'x');
+  shelveAlarms([item('b')], 15, 'x');
   expect(last()).toEqual(['shelve', 1]);
   undo();
   // Only the last action is undone; earlier ones stand.
   expect(ids()).toEqual(['b']);
-  unacknowledgeAlarm(item('a').alarm);
+  unacknowledgeAlarms([item('a')]);
   expect(ids()).toEqual(['a', 'b']);
   undo();
   expect(ids()).toEqual(['b']);
-  shelveAlarm(item('b').alarm, 15, 'x');
-  unshelveAlarm(item('b').alarm);
+  shelveAlarms([item('b')], 15, 'x');
+  unshelveAlarms([item('b')]);
   undo();
   expect(ids()).toEqual([]);
-  unshelveAlarm(item('b').alarm);
+  unshelveAlarms([item('b')]);
   vi.advanceTimersByTime(UNDO_MS);
   expect(lastAction.get()).toBeNull();
-  shelveAlarm(item('b').alarm, 15, 'x');
+  shelveAlarms([item('b')], 15, 'x');
   window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
   expect(lastAction.get()).toBeNull();
 });

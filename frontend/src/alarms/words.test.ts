@@ -153,7 +153,7 @@ test('since when and until when: of today the time alone, to the minute', () => 
 test('what the log does not reach back to has lasted for longer than is known', () => {
   const at = (sec: number) => ({ sec: NOON + sec, nanosec: 0 });
   const old = alarm('a', { raised: NOON + 900, reason: { since: at(0) } });
-  const text = (known: number, each = old) => sinceText(each, NOON + 1_500, at(known), true);
+  const text = (known: number, each = old) => spanText(each, NOON + 1_500, at(known));
   expect(text(-899)).toBe('for over 10\u00a0min');
   expect(text(-900), 'an earlier scan was good').toBe('since 12:15 (10\u00a0min)');
   const pest = { kind: 'pest', since: at(900) } as const;
@@ -162,21 +162,17 @@ test('what the log does not reach back to has lasted for longer than is known', 
 
 test('since when; for how long only if it began today, in hours from ten on', () => {
   const since = alarm('a', { raised: NOON });
-  const text = (nowS: number | null, hasLength = true): string =>
-    sinceText(since, nowS, null, hasLength);
+  const text = (nowS: number | null): string => spanText(since, nowS, null);
   expect(text(NOON + 7_500)).toBe('since 12:00 (2\u00a0h\u00a05\u00a0min)');
   expect(text(NOON + 39_500)).toBe('since 12:00 (10\u00a0h)');
-  expect(text(NOON + 7_500, false)).toBe('since 12:00');
+  expect(sinceText(since, NOON + 7_500, null)).toBe('since 12:00');
   expect(text(NOON + 86_400)).toBe('since 14 Nov, 12:00');
   expect(text(null)).toBe('since 14 Nov, 12:00');
   // The clock was set back since.
   expect(text(NOON - 60)).toBe('since 12:00');
   // A simulated clock has no days.
-  expect(sinceText(alarm('a', { raised: 100 }), 160, null, true)).toMatch(
-    /^since sim .* \(1\u00a0min\)$/,
-  );
+  expect(spanText(alarm('a', { raised: 100 }), 160, null)).toMatch(/^since sim .* \(1\u00a0min\)$/);
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
-  expect(`${lengthOf(over)}, ${resolvedText(over, NOON + 1_500)}`).toBe(
-    '10\u00a0min, resolved 12:10',
-  );
+  expect(lengthOf(over, NOON + 1_500, null)).toBe('10\u00a0min');
+  expect(resolvedText(over, NOON + 1_500)).toBe('resolved 12:10');
 });

@@ -143,33 +143,36 @@ const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: WireTime 
   since !== null &&
   secondsOf(since) - secondsOf(known) < secondsOf(raised_at) - secondsOf(since);
 
-/** Since when; with `hasLength` and if that is today, for how long. At least how long, if it may be older than `known`. */
-export function sinceText(
-  alarm: Alarm,
-  nowS: number | null,
-  known: WireTime | null,
-  hasLength: boolean,
-): string {
+/** Since when; at least how long, if it may be older than `known`. */
+export function sinceText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
   const from = secondsOf(alarm.raised_at);
   const length = nowS === null ? null : secondsSince(from, nowS);
-  if (length !== null && isOlder(alarm, known)) return S.alarmForOver(lengthText(length));
-  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
-  const short = hasLength && isOfToday && length !== null ? lengthText(length) : null;
-  return S.alarmSince(whenText(from, nowS), short);
+  return length !== null && isOlder(alarm, known)
+    ? S.alarmForOver(lengthText(length))
+    : S.alarmSince(whenText(from, nowS));
 }
 
-/** Begin, end and duration of a resolved alarm; otherwise as `sinceText`. */
+/** For how long, unless `sinceText` says it; of an active alarm, only if it began today. Empty: not known. */
+export function lengthOf(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
+  const { raised_at, cleared_at } = alarm;
+  const from = secondsOf(raised_at);
+  if (cleared_at) return lengthText(secondsOf(cleared_at) - from);
+  const length = nowS === null ? null : secondsSince(from, nowS);
+  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
+  return length === null || !isOfToday || isOlder(alarm, known) ? '' : lengthText(length);
+}
+
+/** Begin, end and duration of a resolved alarm; otherwise since when and for how long. */
 export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
   const { raised_at, cleared_at } = alarm;
-  if (cleared_at === null) return sinceText(alarm, nowS, known, true);
+  const length = lengthOf(alarm, nowS, known);
+  if (cleared_at === null) {
+    return `${sinceText(alarm, nowS, known)}${length === '' ? '' : ` (${length})`}`;
+  }
   const [from, until] = [secondsOf(raised_at), secondsOf(cleared_at)];
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
-  return S.alarmUntil(whenText(from, nowS), end, lengthText(until - from));
+  return S.alarmUntil(whenText(from, nowS), end, length);
 }
-
-/** How long a resolved alarm was active; empty: it still is. */
-export const lengthOf = ({ raised_at, cleared_at }: Alarm): string =>
-  cleared_at ? lengthText(secondsOf(cleared_at) - secondsOf(raised_at)) : '';
 
 export const resolvedText = ({ cleared_at }: Alarm, nowS: number | null): string =>
   cleared_at ? `${S.alarmResolved} ${whenText(secondsOf(cleared_at), nowS)}` : '';

@@ -1,4 +1,4 @@
-import { useMemo, useRef, type JSX } from 'react';
+import { useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { withChart } from '../store/view';
@@ -6,7 +6,7 @@ import { S } from '../strings';
 import { Icon } from '../widgets/controls';
 import { useSize } from '../widgets/useSize';
 import { ChartState, MarksKey, PlotView, SensorChoice } from './PlotView';
-import { chosenSensor, pointsFor, useCharts, useChosenSensor, useSensorsOf } from './useLines';
+import { chosenSensor, pointsFor, useCharts, useChosenSensor, useSensorsOf } from './useCharts';
 
 const HEIGHT = 172;
 
@@ -18,13 +18,10 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   const sensor = [chosen, inView].find((name) => sensors.includes(name)) ?? sensors[0];
   const place = useRef<HTMLDivElement>(null);
   const { width } = useSize(place);
-  const plans = useMemo(
-    () => (sensor === undefined ? [] : [{ sensor, tagIds: [tagId] }]),
-    [sensor, tagId],
-  );
-  const { fetched, models } = useCharts(plans, pointsFor(width));
-  const { state } = fetched;
-  const [model] = models;
+  const own = sensor === undefined ? [] : [sensor];
+  const charts = useCharts(own, [tagId], pointsFor(width));
+  const { state } = charts;
+  const [model] = charts.models;
   if (sensor === undefined) return null;
   return (
     <div className="card-chart" ref={place} data-testid="card-chart" data-state={state}>
@@ -51,7 +48,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
           <MarksKey marks={model.lines.flatMap(({ marks }) => marks)} />
         </>
       ) : (
-        <ChartState fetched={fetched} hasLines={false} lacks={null} />
+        <ChartState charts={charts} hasLines={false} lacks={null} />
       )}
     </div>
   );

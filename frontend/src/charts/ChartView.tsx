@@ -1,4 +1,4 @@
-import { Fragment, type JSX, useLayoutEffect, useMemo, useRef, useState } from 'react';
+import { Fragment, type JSX, useLayoutEffect, useRef, useState } from 'react';
 
 import { now } from '../clock';
 import { exportAddress } from '../contract/past';
@@ -16,9 +16,9 @@ import { Icon, IconButton, Select, useFocusBack } from '../widgets/controls';
 import { useSize } from '../widgets/useSize';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
-import { plansOf, type PlotModel, tagLabel } from './model';
+import { type PlotModel, tagLabel } from './model';
 import { TIMES_HEIGHT } from './plot';
-import { pointsFor, useCharts, useSensorsOf } from './useLines';
+import { pointsFor, useCharts, useSensorsOf } from './useCharts';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Least height of each chart of a tag, and of the one chart of a sensor, without the times; CSS pixels. */
@@ -52,13 +52,14 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const sensors = useSensorsOf(tagId);
   const tags = useApp(selectTags);
   // A tag in a link may not be received yet.
-  const tagIds = [...new Set([...tags.map(({ id }) => id), tagId])];
+  const offered = [...new Set([...tags.map(({ id }) => id), tagId])];
 
-  const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
-  const { fetched, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
-  const { span } = fetched;
+  const names = charted.by === 'sensor' ? [sensor] : sensors;
+  const tagIds = charted.by === 'sensor' ? charted.tagIds : [tagId];
+  const charts = useCharts(names, tagIds, pointsFor(size.width), hasDayBefore);
+  const { span, models } = charts;
   const withLines = models.filter(({ lines }) => lines.length > 0);
-  const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
+  const room = (size.height - TIMES_HEIGHT) / Math.max(1, names.length);
   const least = LEAST_HEIGHT[charted.by];
   const scrolls = room - AROUND < least;
   // Whole charts, and the title of the next one as a sign that more follow.
@@ -91,7 +92,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
           <Select
             aria-label={S.tags}
             value={tagId}
-            options={tagIds}
+            options={offered}
             text={tagLabel}
             onChange={(next) => {
               act(withTag(next));
@@ -143,9 +144,9 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
       {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} model={withLines[0]} />}
       <div className="chart-body" ref={body}>
         <ChartState
-          fetched={fetched}
+          charts={charts}
           hasLines={withLines.length > 0}
-          lacks={plans.length === 0 ? S.chartNoSensors : null}
+          lacks={names.length === 0 ? S.chartNoSensors : null}
         />
         {isTable && <ChartTables models={withLines} />}
         {!isTable &&

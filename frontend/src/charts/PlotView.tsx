@@ -11,22 +11,20 @@ import { shown } from '../domain/text';
 import { rosText, type Span } from '../domain/time';
 import { NoteMarks } from '../notes/NoteMarks';
 import { act, useApp } from '../store/app';
-import { pointedBy, pointedTime, useSelected } from '../store/create';
+import { pointedTime, useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
 import { Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
-import { type PlotHandlers, usePlot } from './plot';
-import { type FetchedLines, useSensorsOf } from './useLines';
+import { type PlotHandlers, pointOn, usePlot } from './plot';
+import { type Charts, useSensorsOf } from './useCharts';
 import { zoomTo } from './zoom';
 import { DAY_S } from '../domain/difference';
 
 const HANDLERS: PlotHandlers = {
-  onPoint: (at) => {
-    pointedTime.set(at === null ? null : { at, by: 'chart' });
-  },
+  onPoint: pointedTime.set,
   onPick: (moment) => {
     act({ moment });
   },
@@ -46,14 +44,14 @@ export function PlotView({
   hasTimes?: boolean;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
-  const ofBar = useSelected(pointedTime, pointedBy('bar'));
+  const pointed = useSelected(pointedTime);
   const { at } = useReadoutTime();
   const only = isAlone ? model.lines[0] : undefined;
 
   const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
   useEffect(() => {
-    plot.current?.point(ofBar);
-  }, [plot, ofBar]);
+    pointOn(plot.current, pointed);
+  }, [plot, pointed]);
 
   return (
     <section
@@ -88,7 +86,7 @@ export function PlotView({
 
 /** The time of the values beside charts: under the mouse, else the page's moment; null: the latest. */
 function useReadoutTime(): { at: number | null; isPointed: boolean } {
-  const pointed = useSelected(pointedTime, (it) => it?.at ?? null);
+  const pointed = useSelected(pointedTime);
   // At a past moment, the latest value would be misleading.
   const moment = useApp((state) => state.view.moment);
   return { at: pointed ?? moment, isPointed: pointed !== null };
@@ -179,11 +177,11 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
 }
 
 export function ChartState({
-  fetched: { state, message, span },
+  charts: { state, message, span },
   hasLines,
   lacks,
 }: {
-  fetched: FetchedLines;
+  charts: Charts;
   hasLines: boolean;
   /** What has no data to chart; null: there is some. */
   lacks: string | null;

@@ -10,7 +10,6 @@ import {
   drawnOf,
   limitsOf,
   modelOf,
-  pairKey,
   type PlotModel,
   pointsOf,
   valueRange,
@@ -247,15 +246,13 @@ describe('the limits that are named', () => {
 });
 
 test('the band is that of the plants, and of several kinds there is none', () => {
-  const plan = { sensor: 'temperature', tagIds: ['1', '2'] };
-  const series = new Map(
-    plan.tagIds.map((tagId) => [pairKey({ tagId, sensor: plan.sensor }), seriesWith({ tagId })]),
-  );
+  const tagIds = ['1', '2'];
   const of = (...species: string[]) => {
     const marks = [-3, -1, 98].map((at) => ({ at, widthS: 4, kind: 'failure' as const, count: 1 }));
-    const lines = { series, before: new Map(), marks: new Map([['1', marks]]) };
+    const lines = tagIds.map((tagId) => ({ series: seriesWith({ tagId }), before: null, marks }));
+    const both = cataloguesOf(FILE);
     const span = { from: 0, to: 100 };
-    return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, null, null);
+    return modelOf(CATALOGUE, both, 'temperature', tagIds, species, lines, span, null, null);
   };
   const ideals = (...species: string[]) => of(...species).bands.map(({ ranges }) => ranges.ideal);
   expect(ideals('', 'fern')).toEqual([[18, 26]]);

@@ -9,7 +9,6 @@ import { rangeOf } from '../domain/ramp';
 import { laterBy, marksOf, middleOf, type Point, type Series, seriesOf } from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
-import type { Charted } from '../store/view';
 import { S } from '../strings';
 
 export type Line = PlotModel['lines'][number];
@@ -150,20 +149,9 @@ export function limitsOf(model: PlotModel) {
   return [...edges, ...near.filter(({ side }) => side === 'inside')];
 }
 
-export interface Pair {
-  readonly tagId: string;
-  readonly sensor: string;
-}
-
-export const pairKey = ({ tagId, sensor }: Pair): string => `${sensor}\u0000${tagId}`;
-
-/** Chart data, fetched together: lines by `pairKey`, and marks by tag. */
-export type Lines = Awaited<ReturnType<typeof fetchLines>>;
-
-export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
-
 interface LinesQuery {
-  readonly pairs: readonly Pair[];
+  readonly sensors: readonly string[];
+  readonly tagIds: readonly string[];
   readonly span: Span;
   /** The twin's time, ROS seconds: the span may end later. */
   readonly nowS: number;
@@ -176,91 +164,75 @@ interface LinesQuery {
 /** Buckets of marks: exact to a few pixels. */
 const MARK_POINTS = 200;
 
+/** A line for each sensor of each tag. */
 export async function fetchLines(
-  { pairs, span, nowS, points, dayS }: LinesQuery,
+  { sensors, tagIds, span, nowS, points, dayS }: LinesQuery,
   signal: AbortSignal,
 ) {
-  const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
+  const pairs = sensors.flatMap((sensor) => tagIds.map((tagId) => ({ sensor, tagId })));
   const before = dayS === null ? null : dayBefore(span, dayS);
-  const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
-    const all = pairs.map((pair) => fetchSeries({ ...pair, from, to }, points, signal));
-    return (await Promise.all(all)).map((wire) => [
-      pairKey({ tagId: wire.tag_id, sensor: wire.sensor_type }),
-      seriesOf(wire, nowS),
-    ]);
-  };
+  const fetched = ({ from, to }: Span): Promise<Series[]> =>
+    Promise.all(
+      pairs.map(async (pair) =>
+        seriesOf(await fetchSeries({ ...pair, from, to }, points, signal), nowS),
+      ),
+    );
   const [series, earlier, timelines] = await Promise.all([
     fetched(span),
-    before === null ? [] : fetched(before),
+    before && fetched(before),
     Promise.all(tagIds.map((tagId) => fetchTimeline(span, MARK_POINTS, signal, tagId))),
   ]);
-  return {
-    series: new Map(series),
-    /** Shifted by a day; empty: not requested. */
-    before: new Map(earlier.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
-    marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
-  };
+  const marks = timelines.map(marksOf);
+  return series.map((each, index) => {
+    const then = earlier?.[index];
+    return {
+      series: each,
+      /** The day before, shifted by a day; null: not shown. */
+      before: then ? laterBy(then, dayS ?? 0) : null,
+      marks: marks[index % tagIds.length] ?? [],
+    };
+  });
 }
+
+export type Lines = Awaited<ReturnType<typeof fetchLines>>;
 
 /** Null: before the twin's time began, as in a simulation. */
 function dayBefore({ from, to }: Span, dayS: number): Span | null {
   return to > dayS ? { from: Math.max(0, from - dayS), to: to - dayS } : null;
 }
 
-/** One chart: a sensor, and the tags whose readings of it are its lines. */
-export interface Plan {
-  readonly sensor: string;
-  readonly tagIds: readonly string[];
-}
-
-/** `sensors`: the first tag's sensors; `sensor`: the one in view. */
-export function plansOf(
-  { by, tagIds }: Charted,
-  sensors: readonly string[],
-  sensor: string,
-): Plan[] {
-  if (by === 'sensor') return [{ sensor, tagIds }];
-  const [tagId] = tagIds;
-  if (tagId === undefined) return [];
-  return sensors.map((each) => ({ sensor: each, tagIds: [tagId] }));
-}
-
 export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
 
 /**
- * The received part of a plan. A tag keeps its style, whether others arrive later or have no data.
- * `species` are those of the plan's tags: the ideal range is drawn if all share it.
+ * The received lines of one sensor. A tag keeps its style, whether others arrive later or have no data.
+ * `species` are those of the tags: the ideal range is drawn if all share it.
  */
 export function modelOf(
   catalogue: Catalogue,
   { day, night }: Catalogues,
-  { sensor, tagIds }: Plan,
+  sensor: string,
+  tagIds: readonly string[],
   species: readonly string[],
-  { series, before, marks }: Lines,
+  all: Lines,
   span: Span,
   moment: number | null,
   nowS: number | null,
 ) {
-  const lines = tagIds.flatMap((tagId, look) => {
-    const key = pairKey({ tagId, sensor });
-    const own = series.get(key);
-    if (!own) return [];
-    return [
-      {
-        series: own,
-        /** The day before, shifted by a day; null: not shown. */
-        before: before.get(key) ?? null,
+  const lines = tagIds.flatMap((tagId, look) =>
+    all
+      .filter(({ series }) => series.sensor === sensor && series.tagId === tagId)
+      .map(({ marks, ...line }) => ({
+        ...line,
         /** Index for `lookOf`. */
         look,
         label: tagLabel(tagId),
         /** Those of its period: a bucket belongs to where its middle is. */
-        marks: (marks.get(tagId) ?? []).filter(({ at, widthS }) => {
+        marks: marks.filter(({ at, widthS }) => {
           const middle = at + widthS / 2;
           return middle >= span.from && middle <= span.to;
         }),
-      },
-    ];
-  });
+      })),
+  );
   const now = catalogue.named(sensor);
   const isMixed = new Set(tagIds.map((_, index) => rangesFor(now, species[index] ?? ''))).size > 1;
   const own = (of: Catalogue): Ranges => rangesFor(of.named(sensor), species[0] ?? '');

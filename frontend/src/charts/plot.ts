@@ -1,5 +1,5 @@
 /** One chart on the page: uPlot with the layers of `layers.ts`. */
-import { type RefObject, useEffect, useLayoutEffect, useRef } from 'react';
+import { type RefObject, useLayoutEffect, useRef } from 'react';
 import uPlot from 'uplot';
 
 import { toShown } from '../domain/format';
@@ -27,13 +27,6 @@ export interface PlotHandlers {
   readonly onZoom?: (span: Span) => void;
 }
 
-interface PlotSize {
-  readonly width: number;
-  readonly height: number;
-  /** Whether times and marks are below it: in a stack of charts, the last has them for all. */
-  readonly hasTimes: boolean;
-}
-
 /** Height of the times and the lane of marks, CSS pixels. */
 export const TIMES_HEIGHT = 44 + MARKS_LANE;
 const NO_TIMES_HEIGHT = 8;
@@ -52,22 +45,24 @@ const AXIS_NUMBER = new Intl.NumberFormat(LOCALE, { maximumSignificantDigits: 9 
 
 export const axisText = (value: number): string => AXIS_NUMBER.format(value).replace('-', '\u2212');
 
-type Plot = ReturnType<typeof createPlot>;
-
-function createPlot(element: HTMLElement, handlers: PlotHandlers) {
+/** `latest`: the model to draw; one of another shape needs another chart. */
+function build(
+  element: HTMLElement,
+  latest: RefObject<PlotModel>,
+  hasTimes: boolean,
+  handlers: PlotHandlers,
+): uPlot {
   const colour = coloursOf(element);
-  let model: PlotModel | null = null;
-  let chart: uPlot | null = null;
-  let shape = '';
+  const lane = hasMarks(latest.current) ? MARKS_LANE : 0;
   let ticks: readonly Tick[] = [];
 
-  const frameOf = (u: uPlot, model: PlotModel): Frame => ({
+  const frameOf = (u: uPlot): Frame => ({
     context: u.ctx,
     box: u.bbox,
     ratio: uPlot.pxRatio,
     x: (at) => u.valToPos(at, 'x', true),
-    y: (value) => u.valToPos(toShown(model.sensor, value), 'y', true),
-    model,
+    y: (value) => u.valToPos(toShown(latest.current.sensor, value), 'y', true),
+    model: latest.current,
     colour,
   });
 
@@ -78,114 +73,14 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
     font: `${fontPx()}px ${colour('font')}`,
   });
 
-  const build = (first: PlotModel, { hasTimes, ...size }: PlotSize): uPlot => {
-    const lane = hasMarks(first) ? MARKS_LANE : 0;
-    const u = new uPlot(
-      {
-        ...size,
-        class: 'plot',
-        legend: { show: false },
-        padding: [8, (hasNames(first) ? LIMITS_ROOM : HALF_A_TIME) * fontPx(), 0, 0],
-        cursor: {
-          y: false,
-          dataIdx: heldIndex,
-          points: { size: 8, width: 2, stroke: () => colour('chart-surface'), fill: colourOf },
-          drag: { x: true, y: false, setScale: false, dist: SHORTEST_DRAG },
-          sync: {
-            key: SYNC_KEY,
-            scales: ['x', null],
-            // A drag must not act on the other charts.
-            filters: { pub: (type) => type !== 'mousedown' && type !== 'mouseup' },
-          },
-        },
-        scales: {
-          x: {
-            time: false,
-            range: () => [model?.span.from ?? 0, model?.span.to ?? 1],
-          },
-          y: { range: () => (model ? valueRange(model) : [0, 1]) },
-        },
-        series: [
-          {},
-          ...drawnOf(first).map(({ look, isBefore }) => ({
-            stroke: () => lineColour(colour, look),
-            width: isBefore ? 1.25 : 1.75,
-            alpha: isBefore ? 0.55 : 1,
-            dash: [...(isBefore ? DASH_BEFORE : lookOf(look).dash)],
-            points: { show: false },
-          })),
-        ],
-        axes: [
-          {
-            ...axis(),
-            size: hasTimes ? TIMES_HEIGHT - MARKS_LANE + lane : NO_TIMES_HEIGHT,
-            gap: 5 + lane,
-            lineGap: 1.2,
-            splits: (self) => {
-              ticks = ticksOf(model, self.bbox.width / uPlot.pxRatio);
-              return ticks.map(({ at }) => at);
-            },
-            values: () => ticks.map(({ text }) => (hasTimes ? text : '')),
-          },
-          {
-            ...axis(),
-            size: 48,
-            // Steps are 1, 2 or 5 times a power of ten: room for six gives at least three ticks.
-            space: (_self, _i, _a, _b, height) => Math.max(fontPx(), Math.min(34, height / 6)),
-            values: (_self, splits) => splits.map(axisText),
-          },
-        ],
-        hooks: {
-          drawAxes: [
-            (self) => {
-              if (model) drawBelow(frameOf(self, model));
-            },
-          ],
-          draw: [
-            (self) => {
-              if (!model) return;
-              const frame = frameOf(self, model);
-              drawAbove(frame);
-              if (!hasTimes) return;
-              for (const line of model.lines) drawMarks(frame, line);
-            },
-          ],
-          setCursor: [
-            (self) => {
-              const { left } = self.cursor;
-              handlers.onPoint(left === undefined || left < 0 ? null : self.posToVal(left, 'x'));
-            },
-          ],
-          setSelect: [
-            (self) => {
-              const { left, width } = self.select;
-              self.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-              if (width < SHORTEST_DRAG) return;
-              handlers.onZoom?.({
-                from: self.posToVal(left, 'x'),
-                to: self.posToVal(left + width, 'x'),
-              });
-            },
-          ],
-        },
-      },
-      aligned(first),
-      element,
-    );
-    u.over.addEventListener('click', (event) => {
-      handlers.onPick?.(u.posToVal(event.offsetX, 'x'));
-    });
-    return u;
-  };
-
   const colourOf = (_: uPlot, series: number): string => {
-    const look = (model && drawnOf(model)[series - 1]?.look) ?? 0;
+    const look = drawnOf(latest.current)[series - 1]?.look ?? 0;
     return lineColour(colour, look);
   };
 
   /** The point of the reading valid then, or of the bucket, as in the value beside the chart. */
   const heldIndex = (u: uPlot, series: number, nearest: number, at: number): number => {
-    const drawn = model && drawnOf(model)[series - 1];
+    const drawn = drawnOf(latest.current)[series - 1];
     const [times, values] = [u.data[0], u.data[series]];
     if (!drawn || !values) return nearest;
     // A bucket's point is at its middle.
@@ -193,40 +88,104 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
     return times.findLastIndex((time, index) => time <= last && values[index] !== undefined);
   };
 
-  return {
-    show: (next: PlotModel, size: PlotSize): void => {
-      const before = model;
-      model = next;
-      const nextShape = drawnOf(next)
-        .map(({ look, isBefore }) => `${look}${isBefore ? 'b' : ''}`)
-        .join()
-        .concat(hasMarks(next) ? ' marks' : '', size.hasTimes ? ' times' : '')
-        .concat(hasNames(next) ? ' names' : '');
-      if (!chart || shape !== nextShape) {
-        chart?.destroy();
-        chart = build(next, size);
-        shape = nextShape;
-        return;
-      }
-      if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
-      if (before !== next) chart.setData(aligned(next));
+  const chart = new uPlot(
+    {
+      // Until its place is measured.
+      ...{ width: 300, height: 150 },
+      class: 'plot',
+      legend: { show: false },
+      padding: [8, (hasNames(latest.current) ? LIMITS_ROOM : HALF_A_TIME) * fontPx(), 0, 0],
+      cursor: {
+        y: false,
+        dataIdx: heldIndex,
+        points: { size: 8, width: 2, stroke: () => colour('chart-surface'), fill: colourOf },
+        drag: { x: true, y: false, setScale: false, dist: SHORTEST_DRAG },
+        sync: {
+          key: SYNC_KEY,
+          scales: ['x', null],
+          // A drag must not act on the other charts.
+          filters: { pub: (type) => type !== 'mousedown' && type !== 'mouseup' },
+        },
+      },
+      scales: {
+        x: {
+          time: false,
+          range: () => [latest.current.span.from, latest.current.span.to],
+        },
+        y: { range: () => valueRange(latest.current) },
+      },
+      series: [
+        {},
+        ...drawnOf(latest.current).map(({ look, isBefore }) => ({
+          stroke: () => lineColour(colour, look),
+          width: isBefore ? 1.25 : 1.75,
+          alpha: isBefore ? 0.55 : 1,
+          dash: [...(isBefore ? DASH_BEFORE : lookOf(look).dash)],
+          points: { show: false },
+        })),
+      ],
+      axes: [
+        {
+          ...axis(),
+          size: hasTimes ? TIMES_HEIGHT - MARKS_LANE + lane : NO_TIMES_HEIGHT,
+          gap: 5 + lane,
+          lineGap: 1.2,
+          splits: (self) => {
+            const { span } = latest.current;
+            const most = self.bbox.width / uPlot.pxRatio / TICK_ROOM;
+            ticks = timeTicks(span, most, !hasDate(span.to));
+            return ticks.map(({ at }) => at);
+          },
+          values: () => ticks.map(({ text }) => (hasTimes ? text : '')),
+        },
+        {
+          ...axis(),
+          size: 48,
+          // Steps are 1, 2 or 5 times a power of ten: room for six gives at least three ticks.
+          space: (_self, _i, _a, _b, height) => Math.max(fontPx(), Math.min(34, height / 6)),
+          values: (_self, splits) => splits.map(axisText),
+        },
+      ],
+      hooks: {
+        drawAxes: [
+          (self) => {
+            drawBelow(frameOf(self));
+          },
+        ],
+        draw: [
+          (self) => {
+            const frame = frameOf(self);
+            drawAbove(frame);
+            if (!hasTimes) return;
+            for (const line of frame.model.lines) drawMarks(frame, line);
+          },
+        ],
+        setCursor: [
+          (self) => {
+            const { left } = self.cursor;
+            handlers.onPoint(left === undefined || left < 0 ? null : self.posToVal(left, 'x'));
+          },
+        ],
+        setSelect: [
+          (self) => {
+            const { left, width } = self.select;
+            self.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+            if (width < SHORTEST_DRAG) return;
+            handlers.onZoom?.({
+              from: self.posToVal(left, 'x'),
+              to: self.posToVal(left + width, 'x'),
+            });
+          },
+        ],
+      },
     },
-    /** Marks a time, ROS seconds, as the mouse would, but without an event; null: none. */
-    point: (at: number | null): void => {
-      const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
-      chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
-    },
-    /** Redraws at once in the current colours: a printer does not wait. */
-    recolour: (): void => {
-      chart?.batch(() => {
-        chart?.redraw();
-      });
-    },
-    destroy: (): void => {
-      chart?.destroy();
-      chart = null;
-    },
-  };
+    aligned(latest.current),
+    element,
+  );
+  chart.over.addEventListener('click', (event) => {
+    handlers.onPick?.(chart.posToVal(event.offsetX, 'x'));
+  });
+  return chart;
 }
 
 /** A single line always has room for names, so that stacked charts align in time. */
@@ -241,29 +200,48 @@ export function usePlot(
   hasTimes: boolean,
   handlers: PlotHandlers,
   onLook: (listener: () => void) => () => void,
-): RefObject<Plot | null> {
-  const plot = useRef<Plot | null>(null);
+): RefObject<uPlot | null> {
+  const plot = useRef<uPlot | null>(null);
+  const latest = useRef(model);
   const { width } = useSize(place);
+  const hasSize = width > 0;
+  const looks = drawnOf(model).map(({ look, isBefore }) => [look, isBefore]);
+  const shape = JSON.stringify([looks, hasMarks(model), hasNames(model)]);
+  useLayoutEffect(() => {
+    latest.current = model;
+  }, [model]);
   useLayoutEffect(() => {
     const element = place.current;
-    if (!element) return undefined;
-    const mine = createPlot(element, handlers);
-    plot.current = mine;
-    const stop = onLook(mine.recolour);
+    if (!element || !hasSize) return undefined;
+    const chart = build(element, latest, hasTimes, handlers);
+    plot.current = chart;
+    // At once: a printer does not wait.
+    const stop = onLook(() => {
+      chart.batch(() => {
+        chart.redraw();
+      });
+    });
     return () => {
       plot.current = null;
       stop();
-      mine.destroy();
+      chart.destroy();
       handlers.onPoint(null);
     };
-  }, [place, handlers, onLook]);
-  useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height, hasTimes });
-  }, [model, width, height, hasTimes]);
+  }, [place, shape, hasSize, hasTimes, handlers, onLook]);
+  useLayoutEffect(() => {
+    const chart = plot.current;
+    if (!chart) return;
+    if (chart.width !== width || chart.height !== height) chart.setSize({ width, height });
+    chart.setData(aligned(model));
+  }, [model, width, height, shape, hasTimes]);
   return plot;
 }
 
-const TICK_ROOM = 70;
+/** Marks a time, ROS seconds, unless the mouse does; without an event. Null: none. */
+export function pointOn(chart: uPlot | null, at: number | null): void {
+  if (chart?.over.matches(':hover')) return;
+  const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
+  chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
+}
 
-const ticksOf = (model: PlotModel | null, width: number): readonly Tick[] =>
-  model ? timeTicks(model.span, width / TICK_ROOM, !hasDate(model.span.to)) : [];
+const TICK_ROOM = 70;

@@ -80,14 +80,11 @@ export async function bodyOf<T>(response: Response): Promise<T> {
 
 /** Both kinds of refusal in the contract carry their reason in one field. */
 async function reasonOf(response: Response): Promise<string> {
-  const body: unknown = await response.json().catch(() => null);
-  if (typeof body === 'object' && body !== null) {
-    for (const key of ['error_message', 'detail'] as const) {
-      const text = (body as Record<string, unknown>)[key];
-      if (typeof text === 'string' && text !== '') return text;
-    }
-  }
-  return `${response.status} ${response.statusText}`.trim();
+  const body = (await response.json().catch(() => null)) as Record<string, unknown> | null;
+  const text = body?.['error_message'] || body?.['detail'];
+  return text && typeof text === 'string'
+    ? text
+    : `${response.status} ${response.statusText}`.trim();
 }
 
 export interface FieldQuery {

@@ -76,20 +76,11 @@ export function heldRange(before: Range | null, data: Range): Range {
   const wanted = rounded(data);
   if (!before) return wanted;
   const width = before.high - before.low;
-  const low = sideOf(before.low, wanted.low, wanted.low < before.low, width, data.low);
-  const high = sideOf(before.high, wanted.high, wanted.high > before.high, width, data.high);
+  const end = (of: keyof Range, isWider: boolean): number =>
+    isWider || Math.abs(before[of] - data[of]) > IDLE * width ? wanted[of] : before[of];
+  const low = end('low', wanted.low < before.low);
+  const high = end('high', wanted.high > before.high);
   return low === before.low && high === before.high ? before : { low, high };
-}
-
-function sideOf(
-  held: number,
-  wanted: number,
-  isWider: boolean,
-  width: number,
-  needed: number,
-): number {
-  if (isWider) return wanted;
-  return Math.abs(held - needed) > IDLE * width ? wanted : held;
 }
 
 /** Rounded outwards to about a tenth of its width; a range of no width stays. */

@@ -58,10 +58,8 @@ export function withHeads(areas: readonly Area[]): readonly Line[] {
   });
 }
 
-type Key = number | string | null;
-
 /** What a column sorts by; null sorts last in both directions. */
-function sortKey({ tag, health }: Row, column: string): Key {
+function sortKey({ tag, health }: Row, column: string): number | string | null {
   switch (column) {
     case 'health':
       return severity(health);
@@ -86,24 +84,15 @@ export function sortRows(
 ): Row[] {
   if (column === 'tag') return descending ? [...rows].reverse() : [...rows];
   const direction = descending ? -1 : 1;
-  const keys = rows.map((row) => sortKey(row, column));
-  const ranks = textRanks(keys);
   return rows
-    .map((row, index) => {
-      const key = keys[index] ?? null;
-      return { row, rank: typeof key === 'string' ? (ranks.get(key) ?? 0) : key };
-    })
-    .sort((a, b) => {
-      if (a.rank !== null && b.rank !== null) return direction * (a.rank - b.rank);
-      return Number(a.rank === null) - Number(b.rank === null);
+    .map((row) => ({ row, key: sortKey(row, column) }))
+    .sort(({ key: a }, { key: b }) => {
+      // Many rows share few texts, and a collator is slow.
+      if (a === b) return 0;
+      if (a === null || b === null) return Number(a === null) - Number(b === null);
+      return direction * (typeof a === 'number' ? a - Number(b) : compareIds(a, String(b)));
     })
     .map(({ row }) => row);
-}
-
-/** The rank of each text: many rows share few texts, and a collator is slow. */
-function textRanks(keys: readonly Key[]): ReadonlyMap<string, number> {
-  const texts = new Set(keys.filter((key) => typeof key === 'string'));
-  return new Map([...texts].sort(compareIds).map((text, rank) => [text, rank]));
 }
 
 /** Rows of that health, or of any, that contain every word of the text (`finder`). */

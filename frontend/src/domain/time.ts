@@ -111,17 +111,10 @@ export interface Span {
 
 /** A period's span. `now` is the twin's time, `oldest` the beginning of the history; null: not known. */
 export function spanOf(period: Period, now: number, oldest: number | null): Span {
-  switch (period.kind) {
-    case 'own':
-      return { from: period.from, to: period.to };
-    case 'all':
-      return { from: Math.min(oldest ?? now - LENGTHS.day, now - 1), to: now };
-    case 'hour':
-    case 'day':
-    case 'week':
-    case 'month':
-      return { from: Math.max(0, now - LENGTHS[period.kind]), to: now };
-  }
+  if (period.kind === 'own') return { from: period.from, to: period.to };
+  return period.kind === 'all'
+    ? { from: Math.min(oldest ?? now - LENGTHS.day, now - 1), to: now }
+    : { from: Math.max(0, now - LENGTHS[period.kind]), to: now };
 }
 
 export const endsNow = (period: Period): boolean => period.kind !== 'own';

@@ -109,7 +109,7 @@ function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.
           )}
         </span>
         <span className="fleet-line">
-          {S.alarmSince(whenText(raised, timeOfDay() / 1000), null)}
+          {S.alarmSince(whenText(raised, timeOfDay() / 1000))}
           {!alarm.is_live && ` (${W.wasLive})`}
           {saidOf(alarm).map((said) => (
             <span key={said} className="fleet-alarm-status">

@@ -89,7 +89,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   }, []);
 
   return (
-    <div className="fleet" data-kiosk={isKiosk}>
+    <div className="fleet" data-kiosk={isKiosk} data-size={sizeOf(sites.size)}>
       <header className="fleet-head">
         <h1>{words.sites}</h1>
         {isKiosk && (
@@ -152,6 +152,9 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
     </div>
   );
 }
+
+/** The fewer greenhouses, the more each card shows. */
+const sizeOf = (count: number): string => (count <= 6 ? 'few' : count <= 24 ? 'some' : 'many');
 
 /** When all of it was last known, ms since the epoch; null: it is as of now. */
 function asOfWhen({ archive, lostAt }: Seen): number | null {
@@ -293,11 +296,15 @@ const SiteCard = memo(function SiteCard({
             {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
           </span>
           {causeText !== null &&
-            site.causes.map((cause, index) => (
-              <span key={index} className="fleet-cause">
-                <HealthMark verdict={cause.reason.verdict} text={causeText(cause)} />
-              </span>
-            ))}
+            site.causes.map((cause, index) => {
+              const [text, todo] = causeText(cause);
+              return (
+                <span key={index} className="fleet-cause">
+                  <HealthMark verdict={cause.reason.verdict} text={text} />
+                  <strong>{todo}</strong>
+                </span>
+              );
+            })}
         </div>
         <span className="fleet-line">
           {site.last_received

@@ -63,15 +63,10 @@ export function imageToCanvas(placement: Placement, view: View) {
 
 /** Corners in the map frame of the pixels from (left, top) to (right, bottom), exclusive. */
 export function pixelBoxCorners(placement: Placement, box: Box): MapPoint[] {
-  const { originX, originY, yaw, resolution, height } = placement;
-  const place = (column: number, row: number): MapPoint => {
-    const u = column * resolution;
-    const v = (height - row) * resolution;
-    return mapPoint(
-      originX + u * Math.cos(yaw) - v * Math.sin(yaw),
-      originY + u * Math.sin(yaw) + v * Math.cos(yaw),
-    );
-  };
+  // On a canvas of one pixel per metre, with y down.
+  const [a, b, c, d, e, f] = imageToCanvas(placement, { x: 0, y: 0, scale: 1 });
+  const place = (column: number, row: number): MapPoint =>
+    mapPoint(a * column + c * row + e, -(b * column + d * row + f));
   return [
     place(box.left, box.bottom),
     place(box.right, box.bottom),

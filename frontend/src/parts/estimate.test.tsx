@@ -1,7 +1,7 @@
 import { act as flush, render, screen, waitFor } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import type { Field, Grade, Place, TwinTagState } from '../contract/types';
+import type { Field, Grade, Place, Schemas, TwinTagState } from '../contract/types';
 import { houseHealth } from '../domain/health';
 import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
@@ -10,11 +10,12 @@ import { act, moveViewport, prefer, receive, store } from '../store/app';
 import { marksOnMap } from '../store/create';
 import { withPast } from '../store/twin';
 import { selectTag } from '../store/moment';
-import { bodies, estimated, type Expected, expectedReading, grade } from '../testing/field';
+import { estimated } from '../testing/field';
 import { judgement, reason } from '../testing/health';
 import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
 import { readings, stateFrame, wireTag } from '../testing/tags';
+import { wireTime } from '../testing/timeline';
 import { Legend } from '../ui/Legend';
 import { Readout } from '../ui/MapPanel';
 import {
@@ -26,6 +27,31 @@ import {
   NEAR_M,
   nearTo,
 } from './estimate';
+
+type Expected = Schemas['ExpectedReading'];
+
+const grade = (over: Partial<Grade> = {}): Grade => ({
+  fitted_at: wireTime(1_000),
+  fit_problem: '',
+  graded_since: wireTime(500),
+  day: { scans: 458, inside: 412 },
+  week: { scans: 3_200, inside: 2_900 },
+  share_day: 412 / 458,
+  share_week: 2_900 / 3_200,
+  is_trusted: true,
+  ...over,
+});
+
+const expectedReading = (over: Partial<Expected> = {}): Expected => ({
+  measured: 22.4,
+  observed_at: wireTime(1_000),
+  expected: 22.1,
+  expected_sd: 0.79,
+  z: 0.4,
+  offset: 0.3,
+  left_out: false,
+  ...over,
+});
 
 let grades: Readonly<Record<string, Grade>>;
 let expected: Readonly<Record<string, Expected>>;
@@ -46,11 +72,11 @@ beforeEach(() => {
   places = [];
   vi.stubGlobal('fetch', (url: URL) => {
     const path = url.pathname;
-    if (path.endsWith('quality')) return Promise.resolve(Response.json(bodies.quality(grades)));
-    if (path.endsWith('tags')) return Promise.resolve(Response.json(bodies.tags(expected)));
+    if (path.endsWith('quality')) return Promise.resolve(Response.json({ sensors: grades }));
+    if (path.endsWith('tags')) return Promise.resolve(Response.json({ tags: expected }));
     return Promise.resolve(
       places
-        ? Response.json(bodies.advice(places))
+        ? Response.json({ places })
         : Response.json({ detail: 'no such service' }, { status: 503 }),
     );
   });

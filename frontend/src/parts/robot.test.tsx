@@ -1,11 +1,11 @@
 import { render, act as rendered, screen } from '@testing-library/react';
-import { beforeEach, describe, expect, test, vi } from 'vitest';
+import { beforeEach, expect, test, vi } from 'vitest';
 
 import { moveViewport } from '../store/app';
 import { marksOnMap, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { extended, RobotFact, RobotLayer, robotText, trailLines, type TrailPoint } from './robot';
+import { extended, RobotFact, RobotLayer, robotText } from './robot';
 
 const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
 const robot = {
@@ -81,74 +81,10 @@ test.each([
   expect(screen.getByTestId('robot').dataset['freshness']).toBe('old');
 });
 
-const at = (x: number, seconds: number): TrailPoint => ({ x, y: 0, at: seconds });
-const position = (x: number, sec: number): Parameters<typeof extended>[1] => ({
-  x,
-  y: 0,
-  heading: null,
-  observed_at: { sec, nanosec: 0 },
-});
-
-describe('trail', () => {
-  test('grows by what is apart in place and in time, and is the same one otherwise', () => {
-    const trail = [at(0, 100)];
-    expect(extended(trail, position(5, 100))).toBe(trail);
-    expect(extended(trail, position(0.05, 110))).toBe(trail);
-    expect(extended(trail, position(0.1, 101))).toEqual([at(0, 100), at(0.1, 101)]);
-  });
-
-  test('begins anew after a clock that went back', () => {
-    expect(extended([at(0, 1_000)], position(1, 20))).toEqual([at(1, 20)]);
-  });
-
-  test('is bounded: the oldest go', () => {
-    let trail: readonly TrailPoint[] = [];
-    for (let second = 1; second <= 2_500; second++)
-      trail = extended(trail, position(second, second));
-    expect(trail).toHaveLength(2_000);
-    expect(trail.at(-1)).toEqual(at(2_500, 2_500));
-  });
-
-  test('is drawn in steps of age that hang together, and no older than two minutes', () => {
-    const points = [at(0, 399), at(1, 400), at(2, 402), at(4, 463), at(4.5, 465)];
-    expect(trailLines(points, 520)).toEqual([
-      {
-        points: [
-          [1, 0],
-          [2, 0],
-        ],
-        step: 5,
-      },
-      {
-        points: [
-          [4, 0],
-          [4.5, 0],
-        ],
-        step: 2,
-      },
-    ]);
-  });
-
-  test('is broken after a long silence if the robot has moved', () => {
-    const still = [at(0, 100), at(0.5, 200), at(1, 210)];
-    const ends = trailLines(still, 210).map(({ points }) => points.map(([x]) => x));
-    expect(ends).toEqual([
-      [0, 0.5],
-      [0.5, 1],
-    ]);
-    const gap = [at(0, 100), at(0.5, 110), at(3, 200), at(4, 201)];
-    expect(trailLines(gap, 201).map(({ points }) => points.length)).toEqual([2, 2]);
-  });
-
-  test('is all of the oldest look while the time is not known', () => {
-    expect(trailLines([at(0, 100), at(1, 110)], null)).toEqual([
-      {
-        points: [
-          [0, 0],
-          [1, 0],
-        ],
-        step: 5,
-      },
-    ]);
-  });
+test('the trail is the last three metres: a longer one would hide the field', () => {
+  let trail: ReturnType<typeof extended> = [];
+  for (let x = 0; x < 20; x++) trail = extended(trail, [x, 0]);
+  expect(trail.map(([x]) => x)).toEqual([16, 17, 18, 19]);
+  expect(extended(trail, [19.02, 0])).toBe(trail);
+  expect(extended(trail, [25, 0]), 'an unknown way').toEqual([[25, 0]]);
 });

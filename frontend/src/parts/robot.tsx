@@ -1,14 +1,13 @@
 import '../styles/robot.css';
 
-import { type JSX, type ReactPortal, useEffect, useMemo, useState } from 'react';
+import { type JSX, type ReactPortal, useEffect, useState } from 'react';
 import { createPortal } from 'react-dom';
 
-import { answer } from '../contract/api';
-import type { Robot, RobotNow, WireTime } from '../contract/types';
+import type { RobotNow, WireTime } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
-import { act, type AppState, keepFetched, store, useApp } from '../store/app';
+import { act, type AppState, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { keepClear, robotFrame, useSelected } from '../store/create';
 import { isReceivingNow, rosNow, selectLatest, selectShown } from '../store/moment';
@@ -18,7 +17,6 @@ import { useTicking } from '../widgets/useNow';
 
 /** An older position never looks live, s. */
 const LIVE_S = 10;
-const FADE_S = 10;
 
 /** The robot's position, trail and plan; `RobotFact` has them in words for screen readers. */
 export function RobotLayer(): ReactPortal | null {
@@ -37,14 +35,6 @@ export function RobotLayer(): ReactPortal | null {
   );
   // While nothing arrives, the banner gives the age; the mark ages only if it was old before.
   const isLive = useTicking((now) => ((ageAt(cutAt ?? now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
-  const time = useTicking((now) => {
-    const known = timeOf(store.get(), now);
-    return known === null ? null : String(Math.floor(known / FADE_S) * FADE_S);
-  });
-  const lines = useMemo(
-    () => trailLines(trail, time === null ? null : Number(time)),
-    [trail, time],
-  );
   const looks = isLive === 'live' && isReceiving ? 'live' : 'old';
   const at = position && toCanvas(view, mapPoint(position.x, position.y));
   useClearOfLabels(at && [at.x - view.x, at.y - view.y], isLive === 'old');
@@ -57,9 +47,7 @@ export function RobotLayer(): ReactPortal | null {
     <>
       <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-freshness={looks}>
         <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
-          {lines.map(({ points, step }, index) => (
-            <polyline key={index} className="robot-trail" data-step={step} points={text(points)} />
-          ))}
+          <polyline className="robot-trail" points={text(trail)} />
           {plan && <polyline className="robot-plan" points={text(plan.points)} />}
         </g>
       </svg>
@@ -168,95 +156,38 @@ export function ageOf(stamp: WireTime, time: number | null): number | null {
   return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);
 }
 
-/** Pause between attempts to fetch the trail, ms. */
-const PACE_MS = 5_000;
-
-/** The robot's trail: fetched from the bridge, then extended by received positions. */
-function useTrail(): readonly TrailPoint[] {
-  const [trail, setTrail] = useState<readonly TrailPoint[]>([]);
-  useEffect(() => {
-    const stop = keepFetched<Robot>(
-      {
-        paceMs: PACE_MS,
-        onValue: (robot) => {
-          setTrail(robot.trail.map(trailPoint));
-        },
-      },
-      ({ twin }) =>
-        twin.connection.socket.kind === 'open'
-          ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
-          : null,
-    );
-    const unsubscribe = robotFrame.subscribe(() => {
-      const position = robotFrame.get()?.position;
-      if (position) setTrail((last) => extended(last, position));
-    });
-    return () => {
-      stop();
-      unsubscribe();
-    };
-  }, []);
+/** Where the robot has just come from, by the positions received. */
+function useTrail(): readonly Place[] {
+  const [trail, setTrail] = useState<readonly Place[]>([]);
+  useEffect(
+    () =>
+      robotFrame.subscribe(() => {
+        const position = robotFrame.get()?.position;
+        if (position) setTrail((last) => extended(last, [position.x, position.y]));
+      }),
+    [],
+  );
   return trail;
 }
 
-type Position = NonNullable<RobotNow['position']>;
-
-/** Least distance and time between two points of the trail, as in the bridge. */
-const STEP_M = 0.1;
-const STEP_S = 1;
 /** Length of the trail: a longer one hides what the patrol crosses. */
-const TRAIL_S = 120;
-/** Most points, more than the bridge retains for an hour; beyond it, the oldest are dropped. */
-const MOST_POINTS = 2_000;
-/** After a gap longer and farther than this, the way between is unknown: the line breaks. */
-const GAP_S = 60;
-const GAP_M = 1;
+const TRAIL_M = 3;
+/** Least distance between two of its points. */
+const STEP_M = 0.05;
 
-/** Position in metres, time in ROS seconds. */
-export type TrailPoint = ReturnType<typeof trailPoint>;
-
-const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]) => ({
-  x,
-  y,
-  at: secondsOf(at),
-});
-
-/** The trail with one more position; unchanged if that is too close in place or time. */
-export function extended(trail: readonly TrailPoint[], position: Position): readonly TrailPoint[] {
-  const next = trailPoint(position);
+/** The trail with one more place; unchanged if that is too close. After a jump, the way there is unknown. */
+export function extended(trail: readonly Place[], next: Place): readonly Place[] {
   const last = trail.at(-1);
-  // The clock went back, so later points have no valid time.
-  if (last && next.at < last.at - GAP_S) return [next];
-  if (last && (next.at < last.at + STEP_S || apart(last, next) < STEP_M)) return trail;
-  return [...trail.slice(1 - MOST_POINTS), next];
-}
-
-export const STEPS = 6;
-
-/**
- * The trail as lines of similar age, from step 0 (now) to 5 (two minutes ago). `now` null: the time is
- * unknown, and everything counts as oldest.
- */
-export function trailLines(trail: readonly TrailPoint[], now: number | null) {
-  const lines: { points: [number, number][]; step: number }[] = [];
-  let last: TrailPoint | null = null;
-  for (const point of trail) {
-    const age = now === null ? TRAIL_S : Math.max(0, now - point.at);
-    if (now !== null && age > TRAIL_S) continue;
-    const step = Math.min(STEPS - 1, Math.floor((age / TRAIL_S) * STEPS));
-    const line = lines.at(-1);
-    const isApart = last !== null && point.at - last.at > GAP_S && apart(last, point) > GAP_M;
-    if (line && !isApart) {
-      line.points.push([point.x, point.y]);
-      if (line.step !== step) lines.push({ points: [[point.x, point.y]], step });
-    } else {
-      lines.push({ points: [[point.x, point.y]], step });
-    }
-    last = point;
-  }
-  return lines.filter(({ points }) => points.length > 1);
+  if (last && apart(last, next) < STEP_M) return trail;
+  if (!last || apart(last, next) > TRAIL_M) return [next];
+  let length = apart(last, next);
+  const tail = trail.findLastIndex((place, index) => {
+    length += apart(place, trail[index + 1] ?? place);
+    return length > TRAIL_M;
+  });
+  return [...trail.slice(tail + 1), next];
 }
 
 type Place = readonly [number, number];
 
-const apart = (a: TrailPoint, b: TrailPoint): number => Math.hypot(a.x - b.x, a.y - b.y);
+const apart = (a: Place, b: Place): number => Math.hypot(a[0] - b[0], a[1] - b[1]);

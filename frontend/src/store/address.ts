@@ -64,7 +64,8 @@ export function fromFragment(fragment: string): Linked {
   return {
     moment: moment === undefined || moment < 0 ? null : roundedMoment(moment),
     period: periodOf(parts.get('period')),
-    compare: compareOf(parts.get('compare')),
+    compare:
+      (Object.keys(COMPARED) as Compare[]).find((each) => each === parts.get('compare')) ?? null,
     chart: chartedIn(parts),
     sensor,
     selected: parts.get('tag') || null,
@@ -89,10 +90,6 @@ function periodOf(text: string | null): Period {
   const [from, to] = numbers(text, 2) ?? [];
   if (from === undefined || to === undefined || from < 0 || from >= to) return DEFAULT_VIEW.period;
   return { kind: 'own', from, to };
-}
-
-function compareOf(text: string | null): Compare | null {
-  return (Object.keys(COMPARED) as Compare[]).find((each) => each === text) ?? null;
 }
 
 const chartedIn = (parts: URLSearchParams): Charted | null => {

@@ -44,14 +44,10 @@ export const changed = <State extends object>(state: State, change: Change<State
   withParts(state, typeof change === 'function' ? change(state) : change);
 
 /** All of a store, or what `select` picks; the same state must give the same object. */
-export function useSelected<State>(store: Store<State>): State;
-export function useSelected<State, Part>(store: Store<State>, select: (state: State) => Part): Part;
-export function useSelected<State>(
+export const useSelected = <State, Part = State>(
   store: Store<State>,
-  select: (state: State) => unknown = (state) => state,
-): unknown {
-  return useSyncExternalStore(store.subscribe, () => select(store.get()));
-}
+  select = (state: State) => state as unknown as Part,
+): Part => useSyncExternalStore(store.subscribe, () => select(store.get()));
 
 /** What a screen reader announces beside the focused element. */
 export interface Announcement {
@@ -76,20 +72,8 @@ export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? 
 export const mayWithdraw = (who: Session | null, by: string | null): boolean =>
   who?.can_write_notes === true && (by === who.name || who.role === 'admin');
 
-/** The time under the mouse, in a chart or on the time bar; each shows the other's. */
-interface PointedTime {
-  /** ROS seconds. */
-  readonly at: number;
-  readonly by: 'chart' | 'bar';
-}
-
-export const pointedTime = createStore<PointedTime | null>(null);
-
-/** The time that the other one points at, ROS seconds. */
-export const pointedBy =
-  (by: PointedTime['by']) =>
-  (pointed: PointedTime | null): number | null =>
-    pointed?.by === by ? pointed.at : null;
+/** The time under the mouse, in a chart or on the time bar, ROS seconds; each shows the other's. */
+export const pointedTime = createStore<number | null>(null);
 
 /** The robot's latest frame; null: none received. */
 export const robotFrame = createStore<RobotFrame | null>(null);

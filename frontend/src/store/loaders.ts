@@ -1,14 +1,14 @@
 /** Fetches what frames do not carry, whenever the twin's revision changes. */
-import { now } from '../clock';
+import { now, pause } from '../clock';
 import { answer, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, keepFetched, onChange, receive, store } from './app';
-import { withField, withLatest } from './twin';
+import { withField, withLatest, withQuality } from './twin';
 import { sourceOf } from './derived';
 import { failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { selectLatest } from './moment';
+import { selectLatest, selectShown } from './moment';
 import { DEFAULT_VIEW } from './view';
 
 const FIELD_INTERVAL_MS = 500;
@@ -17,6 +17,8 @@ const ESTIMATE_INTERVAL_MS = 1_000;
 const ESTIMATE_TICK_MS = 10_000;
 const MAP_INTERVAL_MS = 1_000;
 const QUALITY_INTERVAL_MS = 3_000;
+/** The error of a past field is fetched once the moment has stayed this long. */
+const QUALITY_AFTER_MS = 400;
 
 export function startLoaders(): () => void {
   forgetOld();
@@ -51,25 +53,7 @@ export function startLoaders(): () => void {
         return base !== null && hasMap ? { key: base, group: 'map', run: loadMap } : null;
       },
     ),
-    keepFetched<FieldQuality>(
-      {
-        paceMs: QUALITY_INTERVAL_MS,
-        onValue: (quality) => {
-          receive(withLatest({ quality }));
-        },
-        onError: () => {
-          receive(withLatest({ quality: null }));
-        },
-      },
-      (state) => {
-        const base = baseKey(state);
-        const { sensor } = state.view;
-        // Only for the nearest readings: an estimate has its own error.
-        if (base === null || sourceOf(state) === 'estimate') return null;
-        const run = (signal: AbortSignal): Promise<FieldQuality> => fetchQuality(sensor, signal);
-        return { key: `${base}|${sensor}`, group: sensor, run };
-      },
-    ),
+    startQuality(),
   ];
   return () => {
     for (const stop of stops) stop();
@@ -90,6 +74,43 @@ function fieldTask(state: AppState): FetchTask<Field> | null {
     group: `${sensor}|${source}`,
     paceMs: isEstimate ? ESTIMATE_INTERVAL_MS : FIELD_INTERVAL_MS,
     run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
+  };
+}
+
+export const startQuality = (): (() => void) =>
+  keepFetched<FieldQuality>(
+    {
+      paceMs: QUALITY_INTERVAL_MS,
+      onValue: (quality) => {
+        receive(withQuality(quality));
+      },
+      onError: () => {
+        receive(withQuality(null));
+      },
+    },
+    qualityTask,
+  );
+
+/** The error of the shown field of nearest readings; an estimate has its own. */
+function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
+  const { sensor, moment } = state.view;
+  const base = baseKey(state);
+  if (moment === null) {
+    if (base === null || sourceOf(state) === 'estimate') return null;
+    return { key: `${base}|${sensor}`, group: sensor, run: (on) => fetchQuality(sensor, on) };
+  }
+  const { moment: at, field, quality } = selectShown(state);
+  if (at !== moment || field.value?.sensor !== sensor || field.value.sureness || quality)
+    return null;
+  const key = `${at}|${sensor}`;
+  return {
+    key,
+    group: key,
+    run: async (signal) => {
+      await pause(QUALITY_AFTER_MS);
+      signal.throwIfAborted();
+      return fetchQuality(sensor, signal, at);
+    },
   };
 }
 

@@ -8,6 +8,7 @@ import { act, receive, store } from './app';
 import { withConnection, withPast } from './twin';
 import { selectHealth, selectMapped } from './derived';
 import { selectAwaited, selectShown } from './moment';
+import { startQuality } from './loaders';
 import { startPast } from './past';
 
 interface SentRequest {
@@ -220,6 +221,7 @@ test('each connection asks anew, a lost one does not', async () => {
 
 test('how far off the field is, is asked for once the moment stays', async () => {
   go(50);
+  const stopQuality = startQuality();
   await answerAll(50);
   await pass(300);
   go(40);
@@ -239,6 +241,7 @@ test('how far off the field is, is asked for once the moment stays', async () =>
   await pass(400);
   await requests.at(-1)?.answer();
   expect(selectShown(store.get()).quality).toMatchObject({ rmse: 40 });
+  stopQuality();
 });
 
 test('an estimate that is chosen goes the same way: with its state, the newest first, two at once', async () => {
@@ -256,9 +259,11 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
   await answerAll(at);
   expect(shown()).toEqual([at, at, at]);
   expect(selectShown(store.get()).field.value?.sureness?.sdKnown).toBe(1);
+  const stopQuality = startQuality();
   await pass(2_000);
   // The error of the nearest readings is not needed.
   expect(requests.some(({ path }) => path.endsWith('field/quality'))).toBe(false);
+  stopQuality();
 });
 
 test('before all data there is no estimate to ask for, even if a link leads there', async () => {

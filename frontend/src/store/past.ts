@@ -1,8 +1,7 @@
 /** Fetches the greenhouse's state and field as of the requested moment. */
-import { pause } from '../clock';
-import { fetchQuality, Refusal } from '../contract/api';
+import { Refusal } from '../contract/api';
 import { fetchStateAt } from '../contract/past';
-import type { Field, FieldQuality } from '../contract/types';
+import type { Field } from '../contract/types';
 import { snapshotOf } from '../domain/twin';
 import { type AppState, keepFetched, receive, store } from './app';
 import { sourceOf } from './derived';
@@ -16,8 +15,6 @@ import { NO_HOUSE, type Past, withPast } from './twin';
  * answers arrive before an empty page would show.
  */
 const PATIENCE_MS = 300;
-/** The field's error is fetched once the moment has stayed this long. */
-const QUALITY_AFTER_MS = 400;
 
 export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
@@ -61,44 +58,13 @@ export function startPast(): () => void {
     return taskFor(state, moment, receivedOn);
   };
   const parts = ({ view, twin }: AppState): readonly unknown[] => [view, twin];
-  const stops = [
-    keepFetched<Past>(
-      { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError },
-      task,
-    ),
-    keepFetched<FieldQuality>(
-      {
-        paceMs: 0,
-        parts,
-        onValue: (quality) => {
-          const past = selectPast(store.get());
-          if (past) receive(withPast({ ...past, house: { ...past.house, quality } }));
-        },
-      },
-      qualityTask,
-    ),
-  ];
+  const stop = keepFetched<Past>(
+    { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError },
+    task,
+  );
   return () => {
-    for (const stop of stops) stop();
+    stop();
     clearTimeout(patience);
-  };
-}
-
-/** For a field without its error; an estimate has its own. */
-function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
-  const past = selectPast(state);
-  const field = past?.house.field.value;
-  if (!past || !field || field.sureness || past.house.quality) return null;
-  if (past.at !== state.view.moment || field.sensor !== state.view.sensor) return null;
-  const key = `${past.at}|${field.sensor}`;
-  return {
-    key,
-    group: key,
-    run: async (signal) => {
-      await pause(QUALITY_AFTER_MS);
-      signal.throwIfAborted();
-      return fetchQuality(field.sensor, signal, past.at);
-    },
   };
 }
 

@@ -132,6 +132,14 @@ export const withLatest =
   (part: Partial<House>): With =>
   ({ latest }) => ({ latest: { ...latest, ...part } });
 
+/** The error of the shown field. */
+export const withQuality =
+  (quality: FieldQuality | null): With =>
+  ({ latest, past }) =>
+    past
+      ? { past: { ...past, house: { ...past.house, quality } } }
+      : { latest: { ...latest, quality } };
+
 export const withField =
   (field: Fetched<Field>): With =>
   ({ latest }) => ({ latest: { ...latest, field, held: heldAfter(latest.held, field.value) } });

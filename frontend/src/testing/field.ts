@@ -1,6 +1,5 @@
 /** Fields, as in the page and as on the wire. */
-import type { Field, Grade, Place, Schemas, Sureness } from '../contract/types';
-import { wireTime } from './timeline';
+import type { Field, Sureness } from '../contract/types';
 
 /** A field of these rows, the lowest first, with cells of 1 m from the origin. */
 export function fieldWith(rows: readonly (readonly number[])[], over: Partial<Field> = {}): Field {
@@ -43,8 +42,6 @@ const npyAnswer = (
 };
 
 /** One row of cells, starting at (-1.5, 0.5). */
-export type Expected = Schemas['ExpectedReading'];
-
 export const npyField = (values: readonly number[]): Response =>
   npyAnswer('Field', npy([1, values.length], values), {
     ...{ Resolution: 0.05, 'Value-Min': 1, 'Value-Max': 2 },
@@ -77,36 +74,3 @@ export const estimated = (
     sureness: sureness(sd),
     ...over,
   });
-
-export const grade = (over: Partial<Grade> = {}): Grade => ({
-  fitted_at: wireTime(1_000),
-  fit_problem: '',
-  graded_since: wireTime(500),
-  day: { scans: 458, inside: 412 },
-  week: { scans: 3_200, inside: 2_900 },
-  share_day: 412 / 458,
-  share_week: 2_900 / 3_200,
-  is_trusted: true,
-  ...over,
-});
-
-export const expectedReading = (over: Partial<Expected> = {}): Expected => ({
-  measured: 22.4,
-  observed_at: wireTime(1_000),
-  expected: 22.1,
-  expected_sd: 0.79,
-  z: 0.4,
-  offset: 0.3,
-  left_out: false,
-  ...over,
-});
-
-export const bodies = {
-  quality: (sensors: Readonly<Record<string, Grade>>): object => ({ sensors }),
-  tags: (tags: Readonly<Record<string, object>>): object => ({
-    sensor_type: 'temperature',
-    at: wireTime(1_000),
-    tags,
-  }),
-  advice: (places: readonly Place[]): object => ({ sensor_type: 'temperature', places }),
-};

@@ -3,7 +3,7 @@ import { useMemo, useRef, useState, type JSX, type KeyboardEvent, type PointerEv
 import { endsNow, rosText, type Span } from '../domain/time';
 import type { Timeline } from '../domain/timeline';
 import { act, store, useApp } from '../store/app';
-import { pointedBy, pointedTime, useSelected } from '../store/create';
+import { pointedTime, useSelected } from '../store/create';
 import { latestWord, selectAwaited, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { useSize } from '../widgets/useSize';
@@ -42,7 +42,9 @@ export function Slider({
   const shown = useApp((state) => selectShown(state).moment);
   const awaited = useApp(selectAwaited);
   const newest = useApp(latestWord);
-  const ofChart = useSelected(pointedTime, pointedBy('chart'));
+  const anyPointed = useSelected(pointedTime);
+  // What is pointed at here has its bubble.
+  const ofChart = pointed === null ? anyPointed : null;
   const { from, to } = held ?? span;
   const axis = useMemo((): Axis => ({ from, to, width }), [from, to, width]);
   const columns = useMemo(
@@ -65,7 +67,7 @@ export function Slider({
   const onPointerMove = (event: PointerEvent): void => {
     const x = event.pointerType === 'touch' && !held ? null : at(event);
     setPointed(x);
-    pointedTime.set(x === null ? null : { at: momentAt(axis, x), by: 'bar' });
+    pointedTime.set(x === null ? null : momentAt(axis, x));
     if (held) go(chosenAt(axis, at(event), nowS));
   };
   const letGo = (): void => {

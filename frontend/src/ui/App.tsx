@@ -68,6 +68,7 @@ export function App({
       <main
         className="panels"
         data-wide={isWide && !kiosk}
+        data-long={(aspect ?? 0) >= LONG && !kiosk}
         style={{ '--aspect': aspect ?? WIDE } as CSSProperties}
       >
         {isStatusAbove && <HealthSummary kiosk={kiosk} />}
@@ -91,6 +92,9 @@ export function App({
 
 /** A greenhouse is wide if it is at least this many times as wide as deep. */
 const WIDE = 2;
+
+/** And long if its map needs the page's full width. */
+const LONG = 5;
 
 /** Has room for the status above the map of a wide greenhouse. */
 const roomy = window.matchMedia('(min-width: 64em) and (min-height: 43em)');

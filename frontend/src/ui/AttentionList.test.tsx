@@ -1,7 +1,7 @@
 import { act, render, screen, within } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
-import { shelveAlarm } from '../alarms/own';
+import { shelveAlarms } from '../alarms/own';
 import { startAlarms } from '../alarms/watch';
 import { alarm, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
@@ -87,7 +87,7 @@ test('ends with how many more tags there are', () => {
   const areas = (at: number) => [reason({ sensor: `s${Math.floor(at / 3)}` })];
   show(Object.fromEntries(Array.from({ length: 43 }, (_, at) => [`t${at}`, areas(at)])));
   expect(ids()).toHaveLength(40);
-  expect(screen.getByText('+ 3 tags')).toBeTruthy();
+  expect(screen.getByText('+ 3 more')).toBeTruthy();
 });
 
 test('says so when nobody does, and when that is not known', () => {
@@ -110,7 +110,7 @@ test('if all is shelved, or the robot stands still, it does not say that nothing
   act(() => {
     const pestAlarm = alarm('a', { tag_id: 'bug', reason: pest });
     reportAlarms(pestAlarm);
-    shelveAlarm(pestAlarm, 15, 'treated');
+    shelveAlarms([{ alarm: pestAlarm }], 15, 'treated');
   });
   expect(ids()).toEqual([]);
   expect(screen.queryByRole('heading')).toBeNull();

@@ -11,7 +11,7 @@ import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
-import { restOf, restText, selectIsCurrent, useSince, useUrgent, type Urgent } from './DoNow';
+import { restOf, selectIsCurrent, useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
 import { HealthShape } from './HealthMark';
 import { Reasons, useCauseText } from './Reasons';
@@ -58,7 +58,7 @@ export function AttentionList(): JSX.Element {
           <Row key={key} {...line} fits={index < count} />
         ))}
       </ul>
-      {rest > 0 && <p className="attention-more">{restText(rest)}</p>}
+      {rest > 0 && <p className="attention-more">{S.attentionMore(rest)}</p>}
     </div>
   );
 }

@@ -107,7 +107,7 @@ export function useSince({ tagId, reasons, isAcknowledged }: Urgent): string | n
   if (!oldest) return isKnown && isAwaited(reasons[0]) ? S.alarmNotYet : null;
   if (isAcknowledged) return S.healthAcknowledged;
   const state = store.get();
-  return sinceText(oldest, rosNow(state, now()), selectKnownSince(state), false);
+  return sinceText(oldest, rosNow(state, now()), selectKnownSince(state));
 }
 
 /**
@@ -124,6 +124,7 @@ export function DoNow({
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
+  const isCurrent = useApp(selectIsCurrent);
   const hasOwn = health.reasons.length > 0;
   // While the twin is silent, its last tasks stay listed, below the first one: to find out why.
   const isLast = isSilent(health);
@@ -138,7 +139,7 @@ export function DoNow({
     </li>
   );
   return (
-    <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
+    <ul className="do-now" aria-label={S.todoLabel} data-fixed={most > 1 && isCurrent}>
       {isLast && own}
       {isOfTags ? (
         lines.map(([task, ...others], index) => (
@@ -157,12 +158,11 @@ export function DoNow({
               <button
                 type="button"
                 className="do-more"
-                data-short={S.attentionMore(rest)}
                 onClick={() => {
                   act(withList('tags'));
                 }}
               >
-                <span>{restText(rest)}</span>
+                {S.attentionMore(rest)}
               </button>
             )}
           </li>
@@ -184,8 +184,6 @@ export function restOf(all: readonly Urgent[], shownOnes: readonly Urgent[]): nu
   const hidden = new Set(all.filter((each) => !isShown.has(each)).map(({ tagId }) => tagId));
   return [...hidden].filter((id) => !named.has(id)).length || hidden.size;
 }
-
-export const restText = (tags: number): string => `+ ${S.shownOf(tags, tags)}`;
 
 /** Grouped by task, the most severe tag first; acknowledged ones form groups of their own. */
 const byTodo = (urgent: readonly Urgent[]) => [

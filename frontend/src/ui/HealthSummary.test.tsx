@@ -2,7 +2,7 @@ import { act, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import { calling } from '../alarms/list';
-import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarm } from '../alarms/own';
+import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarms } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
@@ -23,7 +23,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: [co2] }));
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
-  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical · 1 tag');
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical');
   expect(driver().textContent).toBe('Tag 5: CO₂ 4,000\u00a0ppm, above 3,000');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
@@ -72,7 +72,7 @@ test('says what to do first, and since when', () => {
   });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: 2 pests seen.* acknowledged$/),
-    expect.stringMatching(/^StressedTag 5: Temperature .* no alarm yet\+ 1 tag$/),
+    expect.stringMatching(/^StressedTag 5: Temperature .* no alarm yet\+ 1 more$/),
   ]);
   stop();
 });
@@ -121,18 +121,18 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
     reportAlarms(alarm('fan', { tag_id: '1' }), alarm('far', { tag_id: '5', reason: failed }));
   });
   expect(todo.textContent).toMatch(
-    /^CriticalTag 1: .*also tags Stressed 2, 3 .*StressedTag 4: .*\+ 1 tag$/,
+    /^CriticalTag 1: .*also tags Stressed 2, 3 .*StressedTag 4: .*\+ 1 more$/,
   );
   // Alarms have their own count beside the table: this button leads to the tags that it counts.
   look({ list: 'alarms' });
-  fireEvent.click(screen.getByRole('button', { name: '+ 1 tag' }));
+  fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
   expect(store.get().view.list).toBe('tags');
   expect(house().textContent).not.toContain('Shelved');
   act(() => {
-    for (const item of calling(alarmList.get()).slice(0, 1)) shelveAlarm(item.alarm, 15, 'fan');
+    shelveAlarms(calling(alarmList.get()).slice(0, 1), 15, 'fan');
   });
-  expect(todo.textContent).toMatch(/^StressedTag 4: .*StressedTag 2: .*also tag 3 .*\+ 1 tag$/);
-  fireEvent.click(screen.getByRole('button', { name: '+ 1 tag' }));
+  expect(todo.textContent).toMatch(/^StressedTag 4: .*StressedTag 2: .*also tag 3 .*\+ 1 more$/);
+  fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
   expect(store.get().view.list).toBe('tags');
   // Heading and counts include the shelved one, so its omission here is stated.
   fireEvent.click(screen.getByRole('button', { name: 'Shelved (1)' }));
@@ -153,7 +153,7 @@ test('that it is too cold is not shelved with that it was too warm', () => {
   render(<HealthSummary kiosk={false} />);
   act(() => {
     reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
-    for (const item of calling(alarmList.get())) shelveAlarm(item.alarm, 15, 'fan');
+    shelveAlarms(calling(alarmList.get()), 15, 'fan');
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent).toBe('');
@@ -327,7 +327,7 @@ test('beside an active alarm, healthy says why', () => {
   );
   // A shelved one is not called active, but counted.
   act(() => {
-    for (const item of calling(alarmList.get())) shelveAlarm(item.alarm, 15, 'fan');
+    shelveAlarms(calling(alarmList.get()), 15, 'fan');
   });
   expect(driver().textContent).toMatch(/^All assessed readings/);
   expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();

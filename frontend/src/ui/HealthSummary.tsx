@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { ageText, intervalText, numberText } from '../domain/format';
-import { isBad, isSilent, VERDICTS, type HouseHealth } from '../domain/health';
+import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
 import { ageSeconds } from '../domain/time';
 import { whenOf } from '../domain/twin';
 import { act, useApp } from '../store/app';
@@ -17,7 +17,6 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
   const hasSnapshot = useApp(selectHasSnapshot);
-  const count = health.counts[health.verdict];
   const isLast = useApp(selectClockFault) === null && isSilent(health);
   return (
     <section
@@ -31,9 +30,6 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
           <span className="unseen">{S.healthHeading}: </span>
           {hasSnapshot && (
             <HealthMark verdict={health.verdict} text={isLast ? S.healthNotCurrent : undefined} />
-          )}
-          {hasSnapshot && isBad(health.verdict) && count > 0 && !isSilent(health) && (
-            <span> · {S.shownOf(count, count)}</span>
           )}
         </h2>
         <ShelvedCount disabled={kiosk} />

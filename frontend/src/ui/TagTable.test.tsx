@@ -154,10 +154,11 @@ describe('table', () => {
     expect(store.get().view.hovered).toBeNull();
   });
 
-  test('its first column has room for the longest name', () => {
+  test('its first column has room for the longest name, and for the species below it', () => {
     render(<TagTable />);
     const column = document.querySelector<HTMLElement>('.col-tag');
     expect(column?.style.getPropertyValue('--letters')).toBe('2');
+    expect(column?.style.getPropertyValue('--species')).toBe('4');
   });
 
   test('a filter that finds nothing offers the way out', () => {

@@ -12,6 +12,7 @@ import {
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import type { AreaHead } from '../domain/table';
+import { speciesText } from '../domain/marks';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
 import { withSort, withTag } from '../store/view';
@@ -38,6 +39,9 @@ export function TagTable(): JSX.Element {
   const hasTags = useApp((state) => selectTags(state).length > 0);
   const longestId = useApp((state) =>
     selectTags(state).reduce((most, { id }) => Math.max(most, id.length), 0),
+  );
+  const longestSpecies = useApp((state) =>
+    selectTags(state).reduce((most, { species }) => Math.max(most, speciesLength(species)), 0),
   );
   const isByArea = useApp((state) => state.settings.byArea);
   const hidden = useApp((state) => state.settings.hidden);
@@ -88,7 +92,15 @@ export function TagTable(): JSX.Element {
     >
       <caption className="unseen">{S.tableCaption}</caption>
       <colgroup>
-        <col className="col-tag" style={letters(longestId)} />
+        <col
+          className="col-tag"
+          style={
+            {
+              ...letters(longestId),
+              '--species': has('species') ? longestSpecies : 0,
+            } as CSSProperties
+          }
+        />
         {has('health') && <col className="col-health" />}
         {has('age') && <col className="col-age" />}
         {sensors.map((sensor) => (
@@ -215,6 +227,8 @@ function onPointerLeave(): void {
 }
 
 const letters = (count: number): CSSProperties => ({ '--letters': count }) as CSSProperties;
+
+const speciesLength = (species: string): number => speciesText(species, 28).length;
 
 /** Length of a label's longest word, in characters. */
 const longestWord = (label: string): number =>

@@ -3,6 +3,7 @@
 import asyncio
 import csv
 import re
+import resource
 import sqlite3
 import stat
 import time
@@ -389,6 +390,17 @@ def test_the_audit_trail_is_csv_with_the_latest_row_first(file: Path) -> None:
         [by, "add account", "anna admin", ""],
     ]
     assert token not in text
+
+
+def test_a_full_disk_is_reported_with_what_to_do(file: Path) -> None:
+    printed(file, "user add anna --role viewer --no-password")
+    _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1, most))
+    try:
+        done = ended(file, "user list")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+    assert f"{file} cannot be read: disk I/O error; if its disk is full, make room" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,7 @@ def seen(proxies: Proxies, path: str = "/", kind: str = "http", **scope: Any) ->
         ("10.0.0.7", ["6.6.6.6, 203.0.113.5"], "203.0.113.5"),  # the left one is unverified
         ("10.0.0.7", ["6.6.6.6", "203.0.113.5"], "203.0.113.5"),  # lines are one list
         ("10.0.0.7", ["203.0.113.5, 192.168.0.2"], "203.0.113.5"),  # through both proxies
+        ("10.0.0.7", ["203.0.113.5, ::ffff:192.168.0.2"], "203.0.113.5"),  # its IPv6 spelling
         ("10.0.0.7", ["203.0.113.5:4711"], "203.0.113.5"),  # some proxies add the client's port
         ("10.0.0.7", ["192.168.0.3, 192.168.0.2"], "192.168.0.3"),  # a request of the proxy itself
         ("::ffff:10.0.0.7", ["203.0.113.5"], "203.0.113.5"),
@@ -74,9 +75,12 @@ def test_the_client_is_the_nearest_address_that_is_not_a_trusted_proxy(
         ("http", ["https"], "https"),
         ("websocket", ["https"], "wss"),
         ("http", ["gopher"], "http"),
+        ("http", ["https, http"], "https"),  # the second one was reached by the first
     ],
 )
-def test_the_scheme_is_that_of_the_nearest_proxy(kind: str, lines: list[str], scheme: str) -> None:
+def test_the_scheme_is_that_of_the_clients_own_request(
+    kind: str, lines: list[str], scheme: str
+) -> None:
     headers = [(b"x-forwarded-proto", line.encode()) for line in lines]
     assert seen(BEHIND_TWO, kind=kind, headers=headers)["scheme"] == scheme
     assert seen(BEHIND_TWO, client=("6.6.6.6", 9), headers=headers)["scheme"] == "http"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.day import DAY_FROM_LX, ClockDay, Day, Light, judge_day, says_day
+from lupin_bridge.judge.day import DAY_FROM_LX, ClockDay, Day, Light, says_day
 from lupin_bridge.judge.judging import MAX_FILE_BYTES, Criteria, own_sensors, unix_s
 from lupin_bridge.judge.quantities import (
     BASE_C,
@@ -39,16 +39,20 @@ def light_of(*readings_lx: float) -> bool | None:
 
 
 def test_the_majority_of_the_working_light_sensors_takes_precedence_over_the_clock() -> None:
-    assert judge_day(light_of(900.0, 800.0), CLOCK, MIDNIGHT_S) == Day(True, "light")
-    assert judge_day(light_of(0.0, 0.0), CLOCK, NOON_S) == Day(False, "light")
-    assert judge_day(light_of(0.0, 900.0, 900.0), None, None).is_day
-    assert not judge_day(light_of(0.0, 0.0, 900.0), None, None).is_day
-    assert judge_day(light_of(math.nan, math.inf, 900.0), None, None) == Day(True, "light")
-    assert judge_day(light_of(math.nan), CLOCK, MIDNIGHT_S) == Day(False, "clock")
-    assert judge_day(light_of(), CLOCK, NOON_S) == Day(True, "clock")
+    def day(at_s: float, *readings_lx: float) -> Day:
+        return Criteria(own_sensors(), None, CLOCK).day(light_of(*readings_lx), round(at_s * 1e9))
+
+    assert day(MIDNIGHT_S, 900.0, 800.0) == Day(True, "light")
+    assert day(NOON_S, 0.0, 0.0) == Day(False, "light")
+    assert day(0.0, 0.0, 900.0, 900.0).is_day
+    assert not day(0.0, 0.0, 0.0, 900.0).is_day
+    assert day(0.0, math.nan, math.inf, 900.0) == Day(True, "light")
+    assert day(MIDNIGHT_S, math.nan) == Day(False, "clock")
+    assert day(NOON_S) == Day(True, "clock")
+    assert day(0.0) == Day(True, "assumed")
     # Exactly the limit is day.
-    assert judge_day(light_of(DAY_FROM_LX), None, None).is_day
-    assert not judge_day(light_of(DAY_FROM_LX - 0.1), None, None).is_day
+    assert day(0.0, DAY_FROM_LX).is_day
+    assert not day(0.0, DAY_FROM_LX - 0.1).is_day
 
 
 @pytest.mark.parametrize(

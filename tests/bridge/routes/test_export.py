@@ -120,13 +120,13 @@ async def test_an_export_to_a_reader_that_does_not_read_stops_and_is_cut_off(dom
     past = MadeUp(lots=[lot] * MANY)
     async with remembering(past, Limits(client_timeout_s=1.0)) as it:
         with deaf_client(it.url, PATH) as client:
-            await until(lambda: it.bridge.admission.exporting == 1, "the export")
+            await until(lambda: len(it.bridge.admission.exports) == 1, "the export")
             server = it.server.server_state.connections
             await until(
                 lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 1,
                 "a socket that is full",
             )
-            await until(lambda: it.bridge.admission.exporting == 0, "its end")
+            await until(lambda: len(it.bridge.admission.exports) == 0, "its end")
             assert past.lots_taken * len(bodies.csv_lines(lot, own_sensors())) < MOST_TAKEN_BYTES
             assert past.is_closed
             with pytest.raises(ConnectionResetError):
@@ -143,7 +143,7 @@ async def test_a_client_has_one_export_and_a_disconnect_frees_its_place(domain: 
             assert refused.json() == {"detail": "127.0.0.1 has 1 export under way, the limit"}
             # It computes nothing while its reader is slow.
             assert it.bridge.admission.being_computed == 0
-        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        await until(lambda: len(it.bridge.admission.exports) == 0, "its place")
         assert past.is_closed
 
 
@@ -161,7 +161,7 @@ async def test_slow_readers_do_not_keep_others_waiting(
             ]
             for client in slow:
                 client.sendall(f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
-            await until(lambda: it.bridge.admission.exporting == EXPORTS, "all places taken")
+            await until(lambda: len(it.bridge.admission.exports) == EXPORTS, "all places taken")
             refused = await it.http.get(PATH)
             assert refused.status_code == 503
             assert refused.headers["retry-after"] == "5"
@@ -175,7 +175,7 @@ async def test_slow_readers_do_not_keep_others_waiting(
             await until_answered(is_served, "an export")
             with pytest.raises(ConnectionResetError):
                 deque(iter(lambda: slow[0].recv(65_536), b""))
-        await until(lambda: it.bridge.admission.exporting == 0, "their places")
+        await until(lambda: len(it.bridge.admission.exports) == 0, "their places")
     assert "the export of 127.0.9.1 is old and is ended for another one" in caplog.text
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
@@ -200,7 +200,7 @@ async def test_a_disconnect_while_a_batch_is_read_ends_the_reading(
         async with it.http.stream("GET", PATH):
             await until(is_reading.is_set, "the second lot being read")
         await until(is_closed.is_set, "its end")
-        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        await until(lambda: len(it.bridge.admission.exports) == 0, "its place")
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
@@ -215,7 +215,7 @@ async def test_a_batch_that_does_not_arrive_in_time_ends_the_export_with_one_lin
         it.twin.rows = lots  # type: ignore[assignment]
         with pytest.raises(httpx.TransportError):
             await it.http.get(PATH)
-        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        await until(lambda: len(it.bridge.admission.exports) == 0, "its place")
     assert "an export ended early: the answer was not ready within 1 s" in caplog.text
     assert "Traceback" not in caplog.text
 
@@ -228,7 +228,7 @@ async def test_a_shutdown_ends_the_export(domain: int) -> None:
         with pytest.raises(httpx.TransportError):
             async for _ in answer.aiter_raw():
                 pass
-        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        await until(lambda: len(it.bridge.admission.exports) == 0, "its place")
 
 
 async def test_an_error_in_the_middle_never_looks_like_the_end(domain: int) -> None:
@@ -236,7 +236,7 @@ async def test_an_error_in_the_middle_never_looks_like_the_end(domain: int) -> N
     async with remembering(past) as it:
         with pytest.raises(httpx.TransportError):
             await it.http.get(PATH)
-        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        await until(lambda: len(it.bridge.admission.exports) == 0, "its place")
         # Also without chunked encoding: a reset connection is no end.
         reader, writer = await asyncio.open_connection(*it.url.removeprefix("http://").split(":"))
         writer.write(f"GET {PATH} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())

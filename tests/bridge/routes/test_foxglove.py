@@ -159,7 +159,7 @@ def refuse(_: object) -> NoReturn:
 async def topics_are_subscribed_while_wanted(here: Any) -> None:
     """Without clients, and then topics end at once."""
     hub, offer, relay = here.bridge.hub, here.bridge.offer, here.bridge.source.relay
-    await until(lambda: len(relay) == 0, "no topic without clients")
+    await until(lambda: len(relay.topics) == 0, "no topic without clients")
     reader, writer = await deaf(here.url, "/foxglove")
     await until(lambda: len(hub) == 1, "one more")
     got = b""
@@ -170,9 +170,9 @@ async def topics_are_subscribed_while_wanted(here: Any) -> None:
             got += await reader.read(1 << 20)
     # The id is free: a failed subscription is not open.
     writer.write(subscribing(offer, "/map"))
-    await until(lambda: len(relay) == 1, "the map's subscription")
+    await until(lambda: len(relay.topics) == 1, "the map's subscription")
     writer.write(masked(TEXT, b'{"op":"unsubscribe","subscriptionIds":[0]}'))
-    await until(lambda: len(relay) == 0, "the map's subscription to end")
+    await until(lambda: len(relay.topics) == 0, "the map's subscription to end")
     writer.transport.abort()
     await until(lambda: len(hub) == 0, "nobody again")
 

@@ -76,7 +76,7 @@ class Stage:
 
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
         board = replace(board_of(alarm(tag_id) for tag_id in tag_ids), source="journal", since_ns=0)
-        self.hub.publish_alarms(alarms_message(board, None, (), 0), now_s)
+        self.hub.publish_beside("alarms", alarms_message(board, None, (), 0), now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **requested: Any) -> Client:
         client = Client(socket, **requested)
@@ -273,16 +273,16 @@ def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage:
     stage.join(usual, wants_status=False)
     stage.join(seldom, wants_status=False, min_interval_s=10.0)
     none = stage.join(Socket(), wants_status=False, wants_alarms=False)
-    stage.hub.publish_robot(b"robot 1", 0.0)
+    stage.hub.publish_beside("robot", b"robot 1", 0.0)
     assert (usual.wires, seldom.wires) == ([], [])
     stage.publish()
     robots = [[it for it in each.wires if b"robot" in it] for each in (usual, seldom)]
     assert robots == [[b"robot 1"], [b"robot 1"]]
-    stage.hub.publish_robot(b"robot 2", 1.0)
-    stage.hub.publish_robot(b"robot 3", 2.0)
+    stage.hub.publish_beside("robot", b"robot 2", 1.0)
+    stage.hub.publish_beside("robot", b"robot 3", 2.0)
     stage.hub.serve_all(3.0)
     robots = [[it for it in each.wires if b"robot" in it] for each in (usual, seldom)]
     assert robots == [[b"robot 1", b"robot 2", b"robot 3"], [b"robot 1"]]
     stage.hub.serve_all(10.0)
     assert seldom.wires[-1] == b"robot 3"
-    assert none.robot_due
+    assert none.beside_due

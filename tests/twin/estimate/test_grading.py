@@ -10,8 +10,7 @@ from lupin_twin.estimate.engine import TagPast
 from lupin_twin.estimate.grading import LEAST_SCANS, NOT_GRADED, Record, Tally, predicted, record_of
 from lupin_twin.estimate.kernel import Hyper, Readings, Scale
 from lupin_twin.estimate.model import Model, fit
-from lupin_twin.estimate.posterior import INFLATION
-from lupin_twin.estimate.solution import MAX_EXACT, gap_of
+from lupin_twin.estimate.solution import INFLATION, MAX_EXACT, gap_of
 from lupin_twin.field.grid import FloatArray
 from tests.bench.bench_estimate_checks import AT_S, ROUNDS, trust
 from tests.bench.other_worlds import restless, world_of

@@ -18,9 +18,9 @@ from lupin_twin.estimate.kernel import (
     scale_of,
 )
 from lupin_twin.estimate.model import Model, fit, hyper_of, minimise, negative_log_posterior
-from lupin_twin.estimate.posterior import INFLATION, Cells, EstimateGrid, Posterior
-from lupin_twin.estimate.solution import MAX_EXACT
-from lupin_twin.field.grid import FloatArray
+from lupin_twin.estimate.posterior import EstimateGrid, Posterior, lattice
+from lupin_twin.estimate.solution import INFLATION, MAX_EXACT
+from lupin_twin.field.grid import FloatArray, cell_centres
 from lupin_twin.field.idw import Abandoned
 from tests.support import textbook_gp
 from tests.support.estimates import (
@@ -153,8 +153,10 @@ def test_a_fine_grid_is_interpolated_with_a_small_error(length: float) -> None:
 def test_a_lattice_is_never_coarser_than_a_fifth_of_the_length(
     side_m: float, length: float
 ) -> None:
-    x, y = Cells.of(0.0, 0.0, side_m, side_m, side_m / 2_000).lattice(length)
-    assert max(np.diff(x).max(), np.diff(y).max()) <= max(length / 5.0, side_m / 2_000) + 1e-9
+    cell_m = side_m / 2_000
+    cells = cell_centres(0.0, 2_000, cell_m)
+    x, y = lattice((cells, cells), cell_m, length)
+    assert max(np.diff(x).max(), np.diff(y).max()) <= max(length / 5.0, cell_m) + 1e-9
 
 
 def beside(posterior: Posterior, grid: EstimateGrid) -> tuple[FloatArray, FloatArray, Any, Any]:

@@ -147,7 +147,7 @@ def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> No
     by_stamp = sorted(every, key=lambda write: (write.stamp_ns, write.number))
     held = [(write, span_at(axis, write.stamp_ns)) for write in by_stamp]
     last = span_at(axis, end_ns)
-    run = [write for write in by_stamp if last and write.run == last.run.id]
+    run = [write for write in by_stamp if last and write.run == last.run]
     expected = [
         recent_of(run, end_ns),
         tuple(
@@ -158,7 +158,7 @@ def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> No
         tuple(
             write
             for write, span in held
-            if start_ns <= write.stamp_ns < end_ns and span and span.run.id == write.run
+            if start_ns <= write.stamp_ns < end_ns and span and span.run == write.run
         ),
     ]
     assert repr(here[:3]) == repr(expected)

@@ -141,7 +141,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
     check_sensors(found["sensors"], [it for it in within if it.kind == 0])
     check_silences(found["silences"], reported, start_ns, end_ns)
     axis = [
-        RunSpan(it.run.id, it.start_ns, min(it.end_ns, end_ns))
+        RunSpan(it.run, it.start_ns, min(it.end_ns, end_ns))
         for it in spans(runs(life.connection.execute))
         if it.start_ns < end_ns
     ]

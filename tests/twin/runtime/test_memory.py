@@ -4,7 +4,7 @@ import sqlite3
 import tempfile
 import threading
 from collections.abc import Iterator
-from concurrent.futures import CancelledError, ProcessPoolExecutor
+from concurrent.futures import CancelledError, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
@@ -16,6 +16,7 @@ import pytest
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Flower, Inspection, Pin, Reading, Scan, TwinStore
+from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.paths import journal_path, state_folder
 from lupin_twin.journal.runs import Clock
@@ -40,7 +41,7 @@ def test_a_file_that_replaces_the_journal_is_read_once_the_twin_has_opened_it(
 
     def is_read(count: int) -> bool:
         try:
-            return memory.recall.query(how_many).result(20.0) == count
+            return memory.recall.answer(how_many, never) == count
         except NotRemembered as error:
             refusals.append(str(error))
             return False
@@ -58,7 +59,7 @@ def test_a_file_that_replaces_the_journal_is_read_once_the_twin_has_opened_it(
         other.replace(path)
         wait_for(lambda: memory.condition.state is JournalState.FOREIGN, "it to be looked at")
         with pytest.raises(NotRemembered, match="name another file"):
-            memory.recall.query(how_many).result(20.0)
+            memory.recall.answer(how_many, never)
     why = "was replaced; the twin opens the new one within seconds"
     assert f"the journal {path} {why}" in refusals
 
@@ -74,7 +75,7 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
         def request(connection: sqlite3.Connection, _: ShouldStop) -> int:
             return len(connection.execute("SELECT readings FROM scan").fetchall())
 
-        return memory.recall.query(request).result(30.0)
+        return memory.recall.answer(request, never)
 
     with twin(path, 5) as life:
         memory = life.memory
@@ -192,7 +193,7 @@ def test_off_is_a_temporary_file_that_answers_and_is_removed_at_the_end(
         memory.apply(SCAN, NOW)
         assert "7" in life.live
         wait_for(lambda: memory.condition.written == 2, "the scan and its place")
-        answer = memory.recall.query(lambda c, _: state_at(c, NOW, "map")).result(10.0)
+        answer = memory.recall.answer(lambda c, _: state_at(c, NOW, "map"), never)
         assert [tag.tag_id for tag in answer.tags] == ["7"]
         assert Path(memory.condition.path).is_relative_to(tmp_path)
         assert memory.condition.state is JournalState.OFF
@@ -248,7 +249,7 @@ def recalling(path: Path, max_s: float = PATIENCE_S) -> Iterator[Recall]:
 
 
 def answer(recall: Recall) -> int:
-    return recall.query(count).result(PATIENCE_S)
+    return recall.answer(count, never)
 
 
 def why_not(recall: Recall) -> str:
@@ -268,7 +269,7 @@ def test_a_query_sees_one_moment(path: Path) -> None:
         return before, count(connection, should_stop)
 
     with recording(path) as journal, recalling(path) as recall:
-        assert recall.query(twice).result(PATIENCE_S) == (1, 1)
+        assert recall.answer(twice, never) == (1, 1)
         assert answer(recall) == 2
 
 
@@ -332,46 +333,47 @@ def test_a_damaged_file_is_reported_with_a_remedy_and_read_again_when_it_is_repa
 def test_an_error_of_a_query_reaches_its_caller(path: Path) -> None:
     append(path, [scan()])
     with recalling(path) as recall:
-        wrong = recall.query(lambda connection, _: connection.execute("SELECT x FROM scan"))
         with pytest.raises(sqlite3.OperationalError, match="no such column"):
-            wrong.result(PATIENCE_S)
+            recall.answer(lambda log, _: log.execute("SELECT x FROM scan"), never)
         assert answer(recall) == 1
 
 
-def test_a_cancelled_query_ends(path: Path) -> None:
+def endless(connection: sqlite3.Connection, _: ShouldStop) -> None:
+    connection.execute(ENDLESS).fetchone()
+
+
+def test_an_abandoned_query_ends(path: Path) -> None:
     append(path, [scan()])
     with recalling(path) as recall:
-        begun = threading.Event()
-
-        def requests(connection: sqlite3.Connection, _: ShouldStop) -> None:
-            begun.set()
-            connection.execute(ENDLESS).fetchone()
-
-        future = recall.query(requests)
-        assert begun.wait(PATIENCE_S)
-        future.cancel()
+        looks = iter(range(1_000))
         with pytest.raises(CancelledError):
-            future.result(PATIENCE_S)
+            recall.answer(endless, lambda: next(looks) > 3)
         assert answer(recall) == 1
 
 
 def test_a_query_that_takes_too_long_ends(path: Path) -> None:
     append(path, [scan()])
-    with recalling(path, 0.05) as recall:
-        future = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
-        with pytest.raises(NotRemembered, match=r"not answer within 0\.05 s"):
-            future.result(PATIENCE_S)
+    timeout = pytest.raises(NotRemembered, match=r"not answer within 0\.05 s")
+    with recalling(path, 0.05) as recall, timeout:
+        recall.answer(endless, never)
 
 
 def test_the_shutdown_ends_running_queries_and_leaves_nothing_open(path: Path) -> None:
     append(path, [scan()])
     with recalling(path) as recall:
         assert answer(recall) == 1
-        running = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
-        wait_for(running.running, "a question that runs")
-        recall.close()
-        with pytest.raises(CancelledError):
-            running.result(PATIENCE_S)
+        looked = threading.Event()
+
+        def asked() -> bool:
+            looked.set()
+            return False
+
+        with ThreadPoolExecutor(1) as elsewhere:
+            running = elsewhere.submit(recall.answer, endless, asked)
+            assert looked.wait(PATIENCE_S)
+            recall.close()
+            with pytest.raises(CancelledError):
+                running.result(PATIENCE_S)
         assert "is ending" in why_not(recall)
         descriptors = [
             link.readlink() for link in Path("/proc/self/fd").iterdir() if link.is_symlink()

@@ -201,28 +201,28 @@ NOT_SMALL_S = 2 * SMALL_S
 
 
 class Stage:
-    """A queue, and searches that end when a test says so."""
+    """A queue, and in place of its workers, jobs that end when a test says so."""
 
     def __init__(self) -> None:
-        self.workers = Workers("test")
         self.woken = threading.Semaphore(0)
         self.is_behind = False
         self.now_s = 100.0
+        workers: Any = self
         self.queue = JobQueue(
-            self.workers, self.woken.release, lambda: self.is_behind, lambda: self.now_s
+            workers, self.woken.release, lambda: self.is_behind, lambda: self.now_s
         )
         self.begun: list[Future[int]] = []
         self.answers: list[Any] = []
 
+    def submit(self, work: Callable[[ShouldStop], Any], _: float) -> Future[int]:
+        job: Future[int] = work(lambda: False)
+        self.begun.append(job)
+        return job
+
     def query(self, cost_s: float = 0.0) -> Future[int]:
-        search: Future[int] = Future()
-
-        def look_up() -> Future[int]:
-            self.begun.append(search)
-            return search
-
-        self.queue.ask(Query(look_up, self.answers.append, str, cost_s))
-        return search
+        job: Future[int] = Future()
+        self.queue.ask(Query(lambda _: job, self.answers.append, cost_s))
+        return job
 
     def delivered(self) -> Any:
         """The next answer; a wake-up brings one at most, and may find none."""
@@ -235,38 +235,33 @@ class Stage:
 
 
 @pytest.fixture
-def made() -> Iterator[Stage]:
-    stage = Stage()
-    yield stage
-    stage.workers.close()
+def made() -> Stage:
+    return Stage()
 
 
 def test_a_failing_query_is_answered_and_delays_nobody(made: Stage) -> None:
     error = NotRemembered("no journal")
-
-    def look_up() -> Future[int]:
-        raise error
-
     for _ in range(2):
-        made.queue.ask(Query(look_up, made.answers.append, str, NOT_SMALL_S))
-    assert made.delivered() is error
-    assert made.delivered() is error
+        made.query(NOT_SMALL_S)
+    for _ in range(2):
+        made.begun[-1].set_exception(error)
+        assert made.delivered() is error
     assert made.queue.waiting == 0
 
 
 def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
-    def reply(answer: str) -> None:
+    def reply(answer: int) -> None:
         raise RuntimeError(answer)
 
     done: Future[int] = Future()
     done.set_result(1)
-    made.queue.ask(Query(lambda: done, reply, str, NOT_SMALL_S))
+    made.queue.ask(Query(lambda _: done, reply, NOT_SMALL_S))
     after = made.query(cost_s=NOT_SMALL_S)
     wait_for(lambda: made.woken.acquire(blocking=False), "the owner to be woken")
     with pytest.raises(RuntimeError):
         made.queue.deliver()
     after.set_result(2)
-    assert made.delivered() == "2"
+    assert made.delivered() == 2
 
 
 def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(made: Stage) -> None:
@@ -279,7 +274,7 @@ def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(made: Stage)
     made.queue.deliver()
     assert made.begun[-1] is large[LARGE_AT_ONCE]
     small[0].set_result(1)
-    assert made.delivered() == "1"
+    assert made.delivered() == 1
     assert made.begun[-1] is small[-1]
 
 
@@ -289,7 +284,7 @@ def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: 
     requested = [made.query(cost_s=cost_s) for _ in range(4)]
     assert made.begun == requested[:1]
     requested[0].set_result(0)
-    assert made.delivered() == "0"
+    assert made.delivered() == 0
     made.now_s += PACE_S - 0.01
     made.queue.go_on()
     assert made.begun == requested[:1], "one answer is no leave for the next"
@@ -299,7 +294,7 @@ def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: 
     assert made.queue.waiting == 3
     made.is_behind = False
     requested[1].set_result(1)
-    assert made.delivered() == "1"
+    assert made.delivered() == 1
     assert made.begun[:3] == requested[:3], "at once"
 
 
@@ -320,4 +315,4 @@ def test_a_flood_of_large_queries_refuses_no_small_one(made: Stage) -> None:
     for _ in range(MAX_QUERIES):
         made.query(cost_s=NOT_SMALL_S)
     made.query().set_result(7)
-    assert made.delivered() == "7"
+    assert made.delivered() == 7

@@ -59,9 +59,10 @@ export function AlarmTimes({
   const known = useApp(selectKnownSince);
   const span = useTicking((at) => spanText(alarm, nowOf(at), known));
   const text = useTicking((at) =>
-    isOver
-      ? `${resolvedText(alarm, nowOf(at))} (${lengthOf(alarm)})`
-      : sinceText(alarm, nowOf(at), known, verdict !== 'healthy'),
+    isOver ? resolvedText(alarm, nowOf(at)) : sinceText(alarm, nowOf(at), known),
+  );
+  const length = useTicking((at) =>
+    verdict === 'healthy' && !isOver ? '' : lengthOf(alarm, nowOf(at), known),
   );
   return (
     <span
@@ -71,7 +72,7 @@ export function AlarmTimes({
     >
       <span>
         {verdict === 'healthy' && `${C.alarm('')} `}
-        {text}{' '}
+        {text} {length !== '' && <span className="alarm-length">({length}) </span>}
       </span>
       <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
     </span>
@@ -101,17 +102,21 @@ export function AlarmTodo({
   );
 }
 
-/** The value now and the worst value, in a column each. */
+/** The value now above the worst value, aligned in one column of the list. */
 export function AlarmFacts({
   alarm,
   values: { state, now: current, worst },
+  of = '',
 }: {
   alarm: Alarm;
   values: ValuesNow;
+  /** Of a heading: whose values these are. */
+  of?: string;
 }): JSX.Element {
   const sensors = useApp(selectCatalogue);
   return (
-    <>
+    <span className="alarm-values">
+      {of !== '' && (state !== null || worst !== null) && <span data-fact="of">{of}</span>}
       {state?.kind === 'known' && current !== null && (
         <Fact name="now" verdict={state.verdict} text={current}>
           {state.value !== null && state.trend !== null && (
@@ -127,7 +132,7 @@ export function AlarmFacts({
         <NotKnown alarm={alarm} state={state} hasLast={worst === null} />
       )}
       {worst !== null && <Fact name="worst" verdict={alarm.reason.verdict} text={worst} />}
-    </>
+    </span>
   );
 }
 
@@ -144,8 +149,10 @@ function Fact({
 }): JSX.Element {
   return (
     <span data-fact={name} data-status={verdict} title={text}>
-      {/* The row itself already marks the verdict now. */}
-      {name === 'worst' && <HealthMark verdict={verdict} word={false} />} {text}
+      <span>
+        {/* The row itself already marks the verdict now. */}
+        {name === 'worst' && <HealthMark verdict={verdict} word={false} />} {text}
+      </span>
       {children && <> {children}</>}
     </span>
   );
@@ -169,7 +176,9 @@ function NotKnown({
   return (
     // Never more lines than a known value: then no row grows.
     <span data-fact="now" data-status="unknown" title={text}>
-      {hasLast ? unknownText(alarm, sensors, state, null) : S.alarmNowUnknown(null, null)}
+      <span>
+        {hasLast ? unknownText(alarm, sensors, state, null) : S.alarmNowUnknown(null, null)}
+      </span>
     </span>
   );
 }

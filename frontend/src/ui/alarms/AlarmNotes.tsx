@@ -20,7 +20,7 @@ import { S } from '../../strings';
 import { Check } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
-import { ignoreDoubleClick } from './AlarmRow';
+import { ignoreDoubleClick } from './AlarmTools';
 
 /** How many tags have a reason that waits for a second scan; null: none, or unknown. */
 export function AlarmsWait(): JSX.Element | null {

@@ -3,33 +3,16 @@ import { Fragment, useMemo, useRef, useState, type FocusEvent, type JSX } from '
 import {
   alarmsCsv,
   arranged,
-  countsText,
   filtered,
   ORDERS,
-  tagsOf,
-  tagsText,
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import {
-  calling,
-  countText,
-  groupOf,
-  heldList,
-  itemsOf,
-  oldestOf,
-  unacknowledged,
-  type AlarmList,
-  type Item,
-} from '../../alarms/list';
+import { calling, countText, heldList, itemsOf, type AlarmList } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { showAlarm } from '../../alarms/follow';
-import { selectNow, todoNow, worstNow, worstNowFirst } from '../../alarms/latest';
-import { partsText, whereText, type Now } from '../../alarms/words';
+import { selectNow, worstNowFirst } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
-import type { Alarm } from '../../contract/types';
-import { airOf } from '../../domain/health';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
@@ -39,14 +22,14 @@ import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
-import { AlarmTimes, AlarmTodo } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmNotes';
-import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
+import { AlarmRow } from './AlarmRow';
+import { ignoreDoubleClick } from './AlarmTools';
+import { CauseHeading } from './CauseHeading';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { sharingText, useIsRefused, useWhoAcknowledged } from './people';
+import { sharingText, useIsRefused } from './people';
 
-/** Rows shown when a shared cause is opened; for others, and with each "more", `MOST_ROWS`. */
-const MOST_OF_CAUSE = 5;
+/** Rows shown at first, and with each "more". */
 const MOST_ROWS = 100;
 
 const isTag = (id: string): boolean => selectLatestTag(store.get(), id) !== undefined;
@@ -138,7 +121,7 @@ export function AlarmPanel(): JSX.Element {
               acknowledgeAlarms(waiting);
             })}
           >
-            <Icon name="check" size={18} /> {S.alarmAcknowledgeAll(waiting.length)}
+            <Icon name="check" size={18} /> {S.alarmAll(S.alarmAcknowledge, waiting.length)}
           </button>
         )}
         <Disclosure
@@ -219,7 +202,7 @@ function Group({
   );
 }
 
-/** Alarm rows of a block; of a shared cause, until its heading is clicked, its first row if it has several tags. */
+/** Alarm rows of a block; those of a shared cause once its heading is clicked. */
 function Rows({
   block: { cause, items },
   group,
@@ -230,10 +213,8 @@ function Rows({
   const [most, setMost] = useState(cause === null ? MOST_ROWS : 0);
   // On paper everything is expanded.
   const isPaper = usePaper();
-  // The heading of a single tag has all its values.
-  const least = tagsOf(items).length > 1 ? 1 : 0;
-  const shown = isPaper ? items.length : Math.max(most, least);
-  const rest = items.length - shown;
+  const shown = isPaper ? items : items.slice(0, most);
+  const rest = items.length - shown.length;
   return (
     <>
       {cause !== null && (
@@ -241,17 +222,19 @@ function Rows({
           cause={cause}
           items={items}
           group={group}
-          isOpen={most > 0}
+          isOpen={shown.length > 0}
           onToggle={() => {
-            setMost(most > 0 ? 0 : MOST_OF_CAUSE);
+            setMost(most > 0 ? 0 : MOST_ROWS);
           }}
         />
       )}
-      <ul data-caused={cause !== null}>
-        {items.slice(0, shown).map((item) => (
-          <AlarmRow key={item.alarm.id} item={item} group={group} />
-        ))}
-      </ul>
+      {shown.length > 0 && (
+        <ul data-caused={cause !== null}>
+          {shown.map((item) => (
+            <AlarmRow key={item.alarm.id} item={item} group={group} />
+          ))}
+        </ul>
+      )}
       {rest > 0 && most > 0 && (
         <button
           type="button"
@@ -264,95 +247,6 @@ function Rows({
         </button>
       )}
     </>
-  );
-}
-
-/**
- * Heading of a shared cause: what is wrong, what to do, and at which tags, whose first row has the values;
- * or at which tag, with the values.
- */
-function CauseHeading({
-  cause,
-  items,
-  group,
-  isOpen,
-  onToggle,
-}: {
-  cause: string;
-  items: readonly Item[];
-  group: keyof AlarmList;
-  isOpen: boolean;
-  onToggle: () => void;
-}): JSX.Element | null {
-  // While the order is held, alarms that left the group are still listed.
-  const own = items.filter((item) => groupOf(item) === group);
-  const shown = own.length > 0 ? own : items;
-  const tags = tagsOf(items);
-  const only = tags.length === 1 ? shown[0] : undefined;
-  const facts = useApp((state) => {
-    const nowOf = (alarm: Alarm): Now | null => selectNow(state, alarm);
-    return only && airOf(only.alarm.reason)
-      ? partsText(shown, selectCatalogue(state), nowOf)
-      : countsText(own, nowOf);
-  });
-  const who = useWhoAcknowledged(only?.alarm ?? null);
-  const verdict = useApp((state) => worstNow(state, shown));
-  const todo = useApp((state) => todoNow(state, shown));
-  if (!verdict) return null;
-  const waiting = unacknowledged(own);
-  const isOver = group === 'resolved';
-  // What was resolved last stands first.
-  const times = isOver ? shown[0]?.alarm : oldestOf(shown);
-  return (
-    <div
-      className="alarm-cause"
-      data-cause={cause}
-      data-health={verdict}
-      data-where={only?.alarm.tag_id}
-    >
-      <button
-        type="button"
-        className="alarm-go"
-        aria-expanded={isOpen}
-        onClick={() => {
-          onToggle();
-          if (only) showAlarm(only.alarm);
-        }}
-      >
-        {times && <AlarmTimes alarm={times} first={null} verdict={verdict} isOver={isOver} />}
-        <span className="alarm-text">
-          <span>
-            <strong>{only ? S.alarmWhat(whereText(only.alarm), cause) : cause}</strong>{' '}
-            <span className="alarm-many">
-              {S.alarmCount(own.length)} <Icon name="chevron" />
-            </span>
-          </span>
-          {group === 'active' && <AlarmTodo text={todo} />}
-          {facts && <span className="alarm-facts">{facts}</span>}
-          {!only && <span className="alarm-facts faint">{tagsText(tags)}</span>}
-        </span>
-      </button>
-      {/* Rendered even without a button, to align with the rows' columns. */}
-      <div className="alarm-tools">
-        {group === 'active' && (
-          <Acknowledge
-            label={S.alarmWhat(S.alarmAcknowledge, cause)}
-            text={S.alarmAcknowledgeAll(waiting.length)}
-            status={
-              // By whom, its first row says, if it has one.
-              waiting.length > 0
-                ? null
-                : own.length > 0
-                  ? (who ?? S.healthAcknowledged)
-                  : S.alarmCount(0)
-            }
-            onAcknowledge={() => {
-              acknowledgeAlarms(waiting);
-            }}
-          />
-        )}
-      </div>
-    </div>
   );
 }
 

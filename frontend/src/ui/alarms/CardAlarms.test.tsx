@@ -1,7 +1,7 @@
 import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
-import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarms } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { act, receive } from '../../store/app';
 import { person } from '../../store/create';
@@ -111,7 +111,7 @@ test('what is shelved says until when and why, has its way back, and is no order
     screen.getByTestId('reasons').querySelector('strong')?.textContent;
   flush(() => {
     reportAlarms(alarm('a', { tag_id: '7' }), alarm('b', { tag_id: '8' }));
-    for (const item of alarmList.get().active) shelveAlarm(item.alarm, 15, 'fan ordered');
+    shelveAlarms(alarmList.get().active, 15, 'fan ordered');
   });
   expect(screen.queryByTestId('card-alarms')).toBeNull();
   expect(screen.getByTestId('card-shelved').textContent).toMatch(

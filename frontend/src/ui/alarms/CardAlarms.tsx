@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { oldestOf, unacknowledged, type Item } from '../../alarms/list';
-import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, unshelveAlarms } from '../../alarms/own';
 import { selectKnownSince, todoNow, worstNow } from '../../alarms/latest';
 import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
@@ -12,7 +12,7 @@ import { selectCatalogue } from '../../store/derived';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
-import { ignoreDoubleClick } from './AlarmRow';
+import { ignoreDoubleClick } from './AlarmTools';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** A tag's alarms on its card: active since when, or shelved until when. */
@@ -53,7 +53,9 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
             acknowledgeAlarms(waiting);
           })}
         >
-          {waiting.length === 1 ? S.alarmAcknowledge : S.alarmAcknowledgeAll(waiting.length)}
+          {waiting.length === 1
+            ? S.alarmAcknowledge
+            : S.alarmAll(S.alarmAcknowledge, waiting.length)}
         </button>
       )}
     </div>
@@ -93,7 +95,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
                   type="button"
                   disabled={isRefused}
                   onClick={ignoreDoubleClick(() => {
-                    unshelveAlarm(alarm);
+                    unshelveAlarms([{ alarm }]);
                   })}
                 >
                   {S.alarmUnshelve}

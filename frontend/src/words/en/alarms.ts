@@ -17,8 +17,7 @@ export const ALARMS = {
   },
   alarmHouse: 'Whole greenhouse',
   alarmWhat: (where: string, what: string): string => `${where}: ${what}`,
-  alarmSince: (when: string, length: string | null): string =>
-    length === null ? `since ${when}` : `since ${when} (${length})`,
+  alarmSince: (when: string): string => `since ${when}`,
   /** The beginning is unknown. */
   alarmForOver: (length: string): string => `for over ${length}`,
   alarmUntil: (from: string, until: string, length: string): string =>
@@ -42,7 +41,8 @@ export const ALARMS = {
   alarmStart: 'Go to start',
   alarmActionsOf: (what: string): string => `Actions: ${what}`,
   alarmAcknowledge: 'Acknowledge',
-  alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,
+  /** An action on several alarms at once. */
+  alarmAll: (what: string, count: number): string => `${what} all (${count})`,
   alarmUnacknowledge: 'Unacknowledge',
   alarmShelve: 'Shelve',
   alarmShelveHint: 'No notification until the time is up, unless it gets worse.',

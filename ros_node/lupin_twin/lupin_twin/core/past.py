@@ -303,6 +303,7 @@ class RunSpan:
     run: int
     start_ns: int
     end_ns: int
+    is_simulated: bool = False
 
 
 def recent_of(writes: Iterable[PastWrite], at_ns: int) -> tuple[PastWrite, ...]:

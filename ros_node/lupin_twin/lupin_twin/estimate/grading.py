@@ -20,8 +20,7 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.estimate.engine import TagPast, all_readings, within
 from lupin_twin.estimate.kernel import Pairs, Readings
 from lupin_twin.estimate.model import Model, fit, of_neighbours
-from lupin_twin.estimate.posterior import INFLATION
-from lupin_twin.estimate.solution import gap_of
+from lupin_twin.estimate.solution import INFLATION, gap_of
 from lupin_twin.field.idw import Abandoned, never
 
 # Half of the predicted interval, in sds: 9 of 10 readings should lie inside.

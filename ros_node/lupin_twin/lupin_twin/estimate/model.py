@@ -23,7 +23,8 @@ from lupin_twin.estimate.kernel import (
     Scale,
     scale_of,
 )
-from lupin_twin.estimate.posterior import INFLATION, Posterior
+from lupin_twin.estimate.posterior import Posterior
+from lupin_twin.estimate.solution import INFLATION
 from lupin_twin.field.grid import FloatArray
 from lupin_twin.field.idw import Abandoned, never
 

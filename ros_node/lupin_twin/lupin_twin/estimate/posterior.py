@@ -17,13 +17,13 @@ import numpy.typing as npt
 
 from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
 from lupin_twin.estimate.solution import (
+    INFLATION,
     MAX_EXACT,
     Change,
     Factor,
     Gain,
     LeftOut,
     Neighbours,
-    Off,
     Place,
     Solved,
     best_places,
@@ -55,67 +55,35 @@ class EstimateGrid(CellGrid):
     sd_known: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cells:
-    """The cells of a grid: centres `x` and `y`, lower corner, size; m."""
+def lattice(
+    cells: tuple[FloatArray, FloatArray], resolution: float, length: float
+) -> tuple[FloatArray, FloatArray]:
+    """The places along x and y, m, at which to compute values that change over `length`, m.
 
-    x: FloatArray
-    y: FloatArray
-    origin_x: float
-    origin_y: float
-    resolution: float
+    They are the centres of the cells themselves, or fewer places, a tenth to a fifth of the length
+    apart.
+    """
+    x, y = cells
+    extent = resolution**2 * len(x) * len(y)
+    step = min(max(length * _STEP, (extent / _CHEAP) ** 0.5), length * _COARSEST_STEP)
+    return cells if step < 2.0 * resolution else (_places(x, step), _places(y, step))
 
-    @classmethod
-    def of(cls, min_x: float, min_y: float, max_x: float, max_y: float, resolution: float) -> Cells:
-        """Make the cells of a box, m."""
-        width, height = grid_dimensions(min_x, min_y, max_x, max_y, resolution)
-        return cls(
-            cell_centres(min_x, width, resolution),
-            cell_centres(min_y, height, resolution),
-            float(min_x),
-            float(min_y),
-            float(resolution),
-        )
 
-    def lattice(self, length: float) -> tuple[FloatArray, FloatArray]:
-        """The places along x and y, m, at which to compute values that change over `length`, m.
-
-        They are the cells themselves, or fewer places, a tenth to a fifth of the length apart.
-        """
-        extent = self.resolution**2 * len(self.x) * len(self.y)
-        step = length * _STEP
-        step = min(max(step, (extent / _CHEAP) ** 0.5), length * _COARSEST_STEP)
-        if step < 2.0 * self.resolution:
-            return self.x, self.y
-        return _places(self.x, step), _places(self.y, step)
-
-    def spread(self, x: FloatArray, y: FloatArray, values: FloatArray) -> FloatArray:
-        """Interpolate lattice values (len(y), len(x)) at the cells; none below their least."""
-        if x is self.x and y is self.y:
-            return values
-        down = np.empty((len(self.y), len(x)))
-        for cells, places, shares in _shares(self.y, y):
-            np.matmul(shares, values[places], out=down[cells])
-        result = np.empty((len(self.y), len(self.x)))
-        for cells, places, shares in _shares(self.x, x):
-            result[:, cells] = down[:, places] @ shares.T
-        np.maximum(result, values.min(), out=result)
-        return result
-
-    def filled(self, mean: FloatArray, sd: FloatArray, sd_known: float) -> EstimateGrid:
-        """Make the grid from mean and sd (len(self.y), len(self.x)), in the sensor's unit."""
-        sd_32 = sd.astype(np.float32)
-        return EstimateGrid(
-            width=len(self.x),
-            height=len(self.y),
-            origin_x=self.origin_x,
-            origin_y=self.origin_y,
-            resolution=self.resolution,
-            mean=mean.astype(np.float32),
-            sd=sd_32,
-            known=sd_32 < sd_known,
-            sd_known=sd_known,
-        )
+def _spread(
+    cells: tuple[FloatArray, FloatArray], places: tuple[FloatArray, FloatArray], values: FloatArray
+) -> FloatArray:
+    """Interpolate values at places, in rows of x, at the cells; none is below their least."""
+    if places is cells:
+        return values.reshape(len(cells[1]), -1)
+    values = values.reshape(len(places[1]), -1)
+    down = np.empty((len(cells[1]), values.shape[1]))
+    for some, near, shares in _shares(cells[1], places[1]):
+        np.matmul(shares, values[near], out=down[some])
+    result = np.empty((len(cells[1]), len(cells[0])))
+    for some, near, shares in _shares(cells[0], places[0]):
+        result[:, some] = down[:, near] @ shares.T
+    np.maximum(result, values.min(), out=result)
+    return result
 
 
 def _places(cells: FloatArray, step: float) -> FloatArray:
@@ -149,9 +117,6 @@ def _shares(cells: FloatArray, places: FloatArray) -> list[tuple[slice, slice, F
     return result
 
 
-# Factor on all sds: the most probable parameters ignore their own uncertainty. Chosen on
-# `tests/bench/other_worlds.CHOOSING`.
-INFLATION: Final = 1.3
 # Numbers in an array of places by tags that is computed at once.
 _AT_ONCE: Final = 4_000_000
 
@@ -195,8 +160,12 @@ class Posterior:
         Fine grids are interpolated between places that are no farther apart than a fifth of the
         length over which the values change.
         """
-        cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
-        x, y = cells.lattice(self.hyper.l)
+        width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
+        cells = (
+            cell_centres(bbox_min_x, width, resolution),
+            cell_centres(bbox_min_y, height, resolution),
+        )
+        x, y = places = lattice(cells, resolution, self.hyper.l)
         if self._is_exact:
             solved, parts = self._whole, []
             for rows in _split(np.arange(len(y)), len(x) * len(solved.xy)):
@@ -207,8 +176,18 @@ class Posterior:
         else:
             mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
         self._go_on()
-        mean, sd = (cells.spread(x, y, one.reshape(len(y), len(x))) for one in (mean, sd))
-        return cells.filled(mean, sd, self.sd_known)
+        mean_32, sd_32 = (_spread(cells, places, one).astype(np.float32) for one in (mean, sd))
+        return EstimateGrid(
+            width,
+            height,
+            float(bbox_min_x),
+            float(bbox_min_y),
+            float(resolution),
+            mean=mean_32,
+            sd=sd_32,
+            known=sd_32 < self.sd_known,
+            sd_known=self.sd_known,
+        )
 
     def changes(self) -> tuple[Change | None, ...]:
         """For each tag, how far its last readings are off; None for a tag without any."""
@@ -217,7 +196,7 @@ class Posterior:
             found = left_out.changed()
             for row in judged.tolist():
                 z, offset, since_s = found[row]
-                expected, sd = self._expected_of(tags[row], left_out.last(row, since_s))
+                expected, sd = self._expected_of(tags[row], *left_out.last(row, since_s))
                 change = Change(z, offset * self.scale.spread, expected, sd, since_s)
                 result[self._tags[tags[row]]] = change
         return tuple(result)
@@ -280,22 +259,22 @@ class Posterior:
         of = self._present
         if self._is_exact:
             every = np.arange(len(of.xy))
-            yield LeftOut.of(self._factor(of), INFLATION), every, every
+            yield LeftOut.of(self._factor(of)), every, every
             return
         for tags, _ in shared_out(of.xy, np.empty((0, 2))):
             near, numbers = self._neighbours.around(tags)
             rows = np.searchsorted(numbers, np.sort(tags))
-            yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
+            yield LeftOut.of(self._factor(near)), numbers, rows
 
-    def _expected_of(self, tag: int, off: Off) -> tuple[float, float]:
+    def _expected_of(self, tag: int, off: float, variance: float) -> tuple[float, float]:
         """The mean and sd predicted for a tag's latest reading from the others.
 
         The inflation applies to the true value, not to the noise of a reading.
         """
         newest = float(self._present.value[self._present.tag == tag][-1])
         noise, spread = self.hyper.noise, self.scale.spread
-        true = max(off.variance - noise, 0.0)
-        return newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
+        true = max(variance - noise, 0.0)
+        return newest - off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
 
     def _in_unit(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
         scale = self.scale

@@ -166,6 +166,9 @@ class Neighbours:
         return np.concatenate(rows)
 
 
+# Factor on all sds: the most probable parameters ignore their own uncertainty. Chosen on
+# `tests/bench/other_worlds.CHOOSING`.
+INFLATION: Final = 1.3
 # A tag has changed if its readings since some moment are together off by `CHANGE_Z` sds, and by
 # that multiple of what is typical for other tags. The latest alone must be off by `NEWEST_Z` sds.
 LEAST_READINGS: Final = 2
@@ -192,30 +195,21 @@ class Change:
     since_s: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Off:
-    """A reading's deviation from its prediction, `off`, and the `variance` of that, with noise."""
-
-    off: float
-    variance: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class LeftOut:
     """Predicts any of the readings, sorted by tag, from the others.
 
-    `wider` is the inflation of sds; `precision` (n, n) and `alpha` (n,) are A and a.
+    `precision` (n, n) and `alpha` (n,) are A and a.
     """
 
     readings: Readings
-    wider: float
     precision: FloatArray
     alpha: FloatArray
 
     @classmethod
-    def of(cls, factor: Factor, wider: float) -> LeftOut:
+    def of(cls, factor: Factor) -> LeftOut:
         """Prepare readings that were factorised."""
-        return cls(factor.readings, wider, factor.root.T @ factor.root, factor.alpha)
+        return cls(factor.readings, factor.root.T @ factor.root, factor.alpha)
 
     def changed(self) -> dict[int, tuple[float, float, float | None]]:
         """Map each tag to z, offset, and the time since when it has changed, s; None: unchanged.
@@ -239,8 +233,11 @@ class LeftOut:
             left.remove(worst)
         return result
 
-    def last(self, tag: int, since_s: float | None) -> Off:
-        """Deviation of a tag's latest reading, without its last four, or those since its change."""
+    def last(self, tag: int, since_s: float | None) -> tuple[float, float]:
+        """How far a tag's latest reading is off, and the variance of that, with noise.
+
+        The tag's last four readings, or those since its change, are left out.
+        """
         own = self._own(tag)
         if since_s is None:
             return self._off(own[-_LAST:], own[-1])
@@ -249,10 +246,10 @@ class LeftOut:
     def _own(self, tag: int) -> IntArray:
         return np.flatnonzero(self.readings.tag == tag)
 
-    def _off(self, block: IntArray, row: int) -> Off:
+    def _off(self, block: IntArray, row: int) -> tuple[float, float]:
         covariance = np.linalg.inv(self.precision[np.ix_(block, block)])
         at = int(np.searchsorted(block, row))
-        return Off(float(covariance[at] @ self.alpha[block]), float(covariance[at, at]))
+        return float(covariance[at] @ self.alpha[block]), float(covariance[at, at])
 
     def _onset(self, tag: int) -> tuple[float, float, int | None]:
         """z, offset and first index of the last readings of a tag that are farthest off, in sds."""
@@ -260,12 +257,12 @@ class LeftOut:
         # Sums over the last reading, the last two, ..: the candidates for readings that are off.
         a = self.alpha[own][::-1].cumsum()
         weight = np.diagonal(self.precision[np.ix_(own, own)][::-1, ::-1].cumsum(0).cumsum(1))
-        z = a / np.sqrt(weight) / self.wider
+        z = a / np.sqrt(weight) / INFLATION
         # A change needs a reading before it, so never all of them are off.
         best = 1 + int(np.argmax(np.abs(z[: max(len(own) - 1, 1)])))
         first: int | None = len(own) - best
-        newest = self._off(own[first:], own[-1])
-        is_still = newest.off * z[best - 1] > NEWEST_Z * abs(z[best - 1]) * newest.variance**0.5
+        off, variance = self._off(own[first:], own[-1])
+        is_still = off * z[best - 1] > NEWEST_Z * abs(z[best - 1]) * variance**0.5
         if best < LEAST_READINGS or not is_still:
             first = None
         return float(z[best - 1]), float(a[best - 1] / weight[best - 1]), first
@@ -277,7 +274,6 @@ class LeftOut:
         lost = np.linalg.solve(self.precision[np.ix_(block, block)], across.T)
         return LeftOut(
             self.readings.take(rest),
-            self.wider,
             self.precision[np.ix_(rest, rest)] - across @ lost,
             self.alpha[rest] - lost.T @ self.alpha[block],
         )

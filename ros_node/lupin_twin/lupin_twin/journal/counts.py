@@ -18,11 +18,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING
-from lupin_twin.core.past import HOUR_NS, SILENCE_NS, Event, Grid, SeriesPast, grid
+from lupin_twin.core.past import HOUR_NS, SILENCE_NS, Event, Grid, RunSpan, SeriesPast, grid
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal import sql
 from lupin_twin.journal.rows import numbers_of
-from lupin_twin.journal.runs import Span
 from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into
 
 # Followed by the number of a run: the last stamp of its deleted rows.
@@ -239,7 +238,7 @@ MAX_ROWS: Final = 50_000
 Entry = tuple[int, int, float]
 
 
-def bounds(span: Span) -> dict[str, Any]:
+def bounds(span: RunSpan) -> dict[str, Any]:
     """SQL parameters of a span, and of the hours that it touches."""
     hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
     return {"start": span.start_ns, "end": span.end_ns, **hours}
@@ -261,14 +260,16 @@ class Table:
 class Part:
     """The requested values within one span; `of` are the parameters of the table's SQL."""
 
-    def __init__(self, log: SiteLog, span: Span, table: Table, of: Mapping[str, Any]) -> None:
+    def __init__(self, log: SiteLog, span: RunSpan, table: Table, of: Mapping[str, Any]) -> None:
         self.span = span
         self._log = log
         self._table = table
         self._of = of
-        self._deleted_ns = deleted_ns(log, span.run.id) if table.hours else -1
+        self._deleted_ns = deleted_ns(log, span.run) if table.hours else -1
 
-    def ask(self, select: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
+    def ask(
+        self, select: str, span: RunSpan | None = None, /, **more: int
+    ) -> list[tuple[Any, ...]]:
         """Execute SQL over a part of the span, or all of it; returns the rows."""
         query = {**bounds(span or self.span), **self._of, **more}
         return list(self._log.execute(select, query).fetchall())
@@ -303,7 +304,7 @@ class Part:
             return found
         return int(self.ask(sql.count(self._table.rows), most=most)[0][0])
 
-    def entries(self, span: Span | None = None) -> list[Entry]:
+    def entries(self, span: RunSpan | None = None) -> list[Entry]:
         """Entries within a part of the span, or all of it."""
         table = self._table
         rows = self.ask(f"SELECT stamp_ns, seq, {table.value} {table.rows}", span)
@@ -373,10 +374,10 @@ class Buckets:
         self.add(index, 1, value, value, value)
 
     def past(self) -> SeriesPast:
-        """The answer, rounded to 12 digits: these are the same in SQLite and PostgreSQL."""
+        """The answer; its means have 12 digits: these are the same in SQLite and PostgreSQL."""
         steps = self.grid
         rows = [
-            (steps.start_ns + index * steps.bucket_ns, n, *map(_rounded, (total / n, low, high)))
+            (steps.start_ns + index * steps.bucket_ns, n, float(f"{total / n:.12g}"), low, high)
             for index, (n, total, low, high) in sorted(self._found.items())
         ]
         return SeriesPast(steps.start_ns, steps.end_ns, steps.bucket_ns, *zip(*rows, strict=True))
@@ -389,11 +390,7 @@ def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int)
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
 
 
-def _rounded(number: float) -> float:
-    return float(f"{number:.12g}")
-
-
-def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:
+def whole_hours(span: RunSpan, horizon_ns: int) -> tuple[tuple[int, int], list[RunSpan]]:
     """Split a span into its whole hours (first, and last excluded) and the rest.
 
     Up to the horizon, rows were deleted: there, an hour that is partly in the span counts as whole.
@@ -407,4 +404,4 @@ def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span
     if first >= last:
         return (0, 0), [span]
     edges = (start_ns, first * HOUR_NS), (last * HOUR_NS, end_ns)
-    return (first, last), [Span(span.run, *edge) for edge in edges if edge[0] < edge[1]]
+    return (first, last), [RunSpan(span.run, *edge) for edge in edges if edge[0] < edge[1]]

@@ -79,8 +79,8 @@ def state_at(connection: sqlite3.Connection, at_ns: int, frame_id: str) -> Snaps
     span = span_at(every, at_ns)
     if span is None:
         return Snapshot(at_ns, frame_id, ())
-    since = since_seq(every, span.run.id, at_ns)
-    known = fold(connection, span.run.id, at_ns, since)
+    since = since_seq(every, span.run, at_ns)
+    known = fold(connection, span.run, at_ns, since)
     return Snapshot(at_ns, frame_id, known.tags[:MAX_TAGS])
 
 

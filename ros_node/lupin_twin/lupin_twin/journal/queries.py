@@ -21,6 +21,7 @@ from lupin_twin.core.past import (
     RECENT_COUNT,
     SILENCE_NS,
     Event,
+    RunSpan,
     SeriesPast,
     SeriesRequest,
     grid,
@@ -41,7 +42,7 @@ from lupin_twin.journal.counts import (
     silence_over,
 )
 from lupin_twin.journal.rows import named_numbers, sensor_names
-from lupin_twin.journal.runs import Run, Span, cut, runs, spans
+from lupin_twin.journal.runs import cut, runs, spans
 from lupin_twin.journal.schema import SiteLog
 
 # Approximate cost of an answer, s; and of events of the whole site, s for each tag.
@@ -78,7 +79,7 @@ def newest(
     log = SiteLog(connection)
     found: dict[str, list[Entry]] = {}
     for span in cut(spans(runs(log.execute)), start_ns, end_ns):
-        within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
+        within = {"run": span.run, "start": span.start_ns, "end": span.end_ns}
         for (text,) in log.execute(sql.SENSORS, within).fetchall():
             names = sensor_names(text)
             if sensor_type not in names:
@@ -99,7 +100,7 @@ def newest(
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[Part]:
     found = []
     for span in cut(spans(runs(log.execute)), start_ns, end_ns):
-        of_run = {"run": span.run.id, "tag": request.tag_id}
+        of_run = {"run": span.run, "tag": request.tag_id}
         for number, text in log.execute(sql.SERIES, of_run).fetchall():
             names = sensor_names(text)
             if request.sensor_type in names:
@@ -156,9 +157,9 @@ def _events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
     return answer(parts_of, start_ns, end_ns, request.max_points)
 
 
-def _runs(found: Sequence[Span], start_ns: int, end_ns: int) -> SeriesPast:
+def _runs(found: Sequence[RunSpan], start_ns: int, end_ns: int) -> SeriesPast:
     found = found[-MAX_POINTS:]
-    simulated = tuple(float(span.run.begun.is_simulated) for span in found)
+    simulated = tuple(float(span.is_simulated) for span in found)
     return SeriesPast(
         start_ns,
         end_ns,
@@ -175,7 +176,7 @@ def _runs(found: Sequence[Span], start_ns: int, end_ns: int) -> SeriesPast:
 
 
 def _silences(
-    source: _Source, axis: Sequence[Span], period: Extent, now_ns: int
+    source: _Source, axis: Sequence[RunSpan], period: Extent, now_ns: int
 ) -> Iterator[tuple[int, float]]:
     """Yield (start, seconds) of each silence, cut to the period; the last may last until now.
 
@@ -202,7 +203,7 @@ def _silences(
                 yield begun_ns, (ended_ns - begun_ns) / 1e9
 
 
-def _outermost(source: _Source, axis: Iterable[Span], which: int) -> int | None:
+def _outermost(source: _Source, axis: Iterable[RunSpan], which: int) -> int | None:
     """The first (0) or last (1) attempt of the first span with any."""
     found = (ends[which] for span in axis if (ends := source.ends(span)) is not None)
     return next(found, None)
@@ -222,7 +223,9 @@ class _Source:
         self._log = log
         self.tag = tag
 
-    def parts(self, event: Event, axis: Sequence[Span], start_ns: int, end_ns: int) -> list[Part]:
+    def parts(
+        self, event: Event, axis: Iterable[RunSpan], start_ns: int, end_ns: int
+    ) -> list[Part]:
         """The events of a period, by spans."""
         value, rows = _ROWS[event]
         is_tallied = self.tag is None and event in TALLIED
@@ -230,11 +233,11 @@ class _Source:
         table = Table(sql.of_tag(rows, self.tag), value, _numbers, hours)
         of = {"tag": self.tag, "event": event}
         return [
-            Part(self._log, span, table, of | {"run": span.run.id})
+            Part(self._log, span, table, of | {"run": span.run})
             for span in cut(axis, start_ns, end_ns)
         ]
 
-    def scans(self, axis: Sequence[Span], end_ns: int) -> list[list[int]]:
+    def scans(self, axis: Sequence[RunSpan], end_ns: int) -> list[list[int]]:
         """Each tag's last attempts to scan it before a moment, oldest first."""
         found = defaultdict[str, list[int]](list)
         for span in cut(axis, 0, end_ns)[-1:]:
@@ -242,7 +245,7 @@ class _Source:
                 found[tag].append(stamp_ns)
         return [sorted(stamps)[-RECENT_COUNT:] for stamps in found.values()]
 
-    def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
+    def stretches(self, span: RunSpan, longest_ns: int, period: Extent) -> Iterable[Extent]:
         """The attempts of a period and the next ones on both sides, as extents in order.
 
         Attempts that follow each other within `longest_ns` may be in one extent.
@@ -257,18 +260,18 @@ class _Source:
         ends = self.ends(span)
         if ends is None:
             return []
-        query = {"run": span.run.id, "event": Event.SILENCES, "longest": longest_ns}
+        query = {"run": span.run, "event": Event.SILENCES, "longest": longest_ns}
         query |= {"start": period[0], "end": period[1], "least": ends[0], "most": ends[1]}
         silences = self._log.execute(sql.SILENCES, query).fetchall()
         edges = [ends[0], *(at_ns for silence in silences for at_ns in silence), ends[1]]
         return list(zip(edges[::2], edges[1::2], strict=True))
 
-    def ends(self, span: Span) -> Extent | None:
+    def ends(self, span: RunSpan) -> Extent | None:
         """The first and the last attempt; None if there was none."""
         if self.tag is not None:
             found = [row for row in self.ask(sql.ENDS, span) if row[0] is not None]
             return (min(found)[0], max(last for _, last in found)) if found else None
-        every = extent(self._log, span.run.id)
+        every = extent(self._log, span.run)
         if every is None or every[1] < span.start_ns or every[0] >= span.end_ns:
             return None
         first_ns, last_ns = every
@@ -278,23 +281,23 @@ class _Source:
             last_ns = self._near(span.run, span.end_ns - 1, 0)
         return (first_ns, last_ns) if first_ns <= last_ns else None
 
-    def _near(self, run: Run, at_ns: int, which: int) -> int:
+    def _near(self, run: int, at_ns: int, which: int) -> int:
         """The last attempt up to a moment (0) or the first from then on (1).
 
         There have to be attempts on both sides.
         """
-        over = silence_over(self._log, run.id, at_ns if which else at_ns + 1)
+        over = silence_over(self._log, run, at_ns if which else at_ns + 1)
         if over is not None:
             return over[which]
         start_ns = at_ns if which else at_ns - SILENCE_NS
-        rows = self.ask(sql.ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
+        rows = self.ask(sql.ENDS, RunSpan(run, start_ns, start_ns + SILENCE_NS + 1))
         found: list[int] = [row[1 - which] for row in rows if row[0] is not None]
         if not found:  # its rows are deleted
             return at_ns
         return min(found) if which else max(found)
 
-    def ask(self, select: str, span: Span, **more: int) -> list[tuple[Any, ...]]:
-        query = bounds(span) | {"run": span.run.id, "tag": self.tag} | more
+    def ask(self, select: str, span: RunSpan, **more: int) -> list[tuple[Any, ...]]:
+        query = bounds(span) | {"run": span.run, "tag": self.tag} | more
         return list(self._log.execute(sql.of_tag(select, self.tag), query).fetchall())
 
 

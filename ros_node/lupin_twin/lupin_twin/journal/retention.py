@@ -73,7 +73,7 @@ def kept(connection: sqlite3.Connection) -> Stretches:
     every = runs(connection.execute)
     found: list[tuple[int, int]] = []
     for number, span in enumerate(spans(every)):
-        run = span.run.id
+        run = span.run
         lost_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
         start_ns = max(span.start_ns, deleted_ns(SiteLog(connection), run) + 1, lost_ns + 1)
         if number == 0 and start_ns == 0:

@@ -62,7 +62,7 @@ def latest(connection: sqlite3.Connection, tag_id: str, count: int) -> list[Scan
     span = span_at(runs(connection.execute), FOREVER_NS)
     if span is None:
         return []
-    parameters: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run.id}
+    parameters: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run}
     parameters |= {"tag": tag_id, "depth": count}
     found = _inspections(connection, sql.LATEST_INSPECTIONS, parameters)
     for (number,) in connection.execute(sql.SERIES_OF_TAG, parameters).fetchall():

@@ -13,13 +13,13 @@ from __future__ import annotations
 import heapq
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Final
 
 from lupin_twin.core.diagnostics import origin_of
 from lupin_twin.core.parameters import DAY_S, World
-from lupin_twin.core.past import FOREVER_NS
+from lupin_twin.core.past import FOREVER_NS, RunSpan
 from lupin_twin.journal import sql
 from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog, insert_into
 
@@ -67,15 +67,6 @@ class Run:
         return self.id if self.joins is None else self.joins
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """A period of ROS time, `start_ns <= stamp < end_ns`, and the run that it belongs to."""
-
-    run: Run
-    start_ns: int
-    end_ns: int
-
-
 def runs(execute: Callable[..., Any]) -> list[Run]:
     """Every run and step, in the order in which they began; in SQLite or PostgreSQL."""
     return [
@@ -91,7 +82,7 @@ def since_seq(every: Iterable[Run], root: int, at_ns: int) -> int:
     return (begun or steps)[-1 if begun else 0].begun_seq
 
 
-def spans(every: Iterable[Run]) -> tuple[Span, ...]:
+def spans(every: Iterable[Run]) -> tuple[RunSpan, ...]:
     """Divide the time axis from 0 to `FOREVER_NS` among the runs, in order; empty without a run."""
     every = list(every)
     roots = [run for run in every if run.joins is None]
@@ -121,11 +112,12 @@ def spans(every: Iterable[Run]) -> tuple[Span, ...]:
         return ()
     ends_ns = [*(start_ns for start_ns, _ in starts[1:]), FOREVER_NS]
     return tuple(
-        Span(run, start_ns, end_ns) for (start_ns, run), end_ns in zip(starts, ends_ns, strict=True)
+        RunSpan(run.id, start_ns, end_ns, run.begun.is_simulated)
+        for (start_ns, run), end_ns in zip(starts, ends_ns, strict=True)
     )
 
 
-def span_at(every: Iterable[Run], at_ns: int) -> Span | None:
+def span_at(every: Iterable[Run], at_ns: int) -> RunSpan | None:
     """The span of a moment; None before 0, or if there is no run."""
     found = spans(every)
     index = bisect_right([span.start_ns for span in found], at_ns)
@@ -135,7 +127,7 @@ def span_at(every: Iterable[Run], at_ns: int) -> Span | None:
 def world_of(log: SiteLog) -> World:
     """The observed world, as noted by the twin that wrote last."""
     span = span_at(runs(log.execute), FOREVER_NS)
-    is_simulated = span is not None and span.run.begun.is_simulated
+    is_simulated = span is not None and span.is_simulated
     origin = origin_of(log.meta(ORIGIN) or "", is_simulated=is_simulated)
     try:
         day_s = float(log.meta(DAY_LENGTH) or "")
@@ -145,10 +137,10 @@ def world_of(log: SiteLog) -> World:
     return World(origin, day_s) if 1.0 <= day_s <= DAY_S else World(origin)
 
 
-def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:
+def cut(axis: Iterable[RunSpan], start_ns: int, end_ns: int) -> list[RunSpan]:
     """The spans of `start_ns <= stamp < end_ns`, cut to that."""
     return [
-        Span(span.run, max(span.start_ns, start_ns), min(span.end_ns, end_ns))
+        replace(span, start_ns=max(span.start_ns, start_ns), end_ns=min(span.end_ns, end_ns))
         for span in axis
         if max(span.start_ns, start_ns) < min(span.end_ns, end_ns)
     ]

@@ -284,6 +284,7 @@ def open_reader(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
     try:
         connection.execute("PRAGMA mmap_size = 0")
         connection.execute("PRAGMA query_only = 1")
+        connection.execute("PRAGMA cache_size = -8000")
         _check_identity(connection, path)
     except BaseException:
         connection.close()

@@ -12,7 +12,7 @@ import re
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future
 from dataclasses import asdict, replace
 from typing import Any, Final
@@ -34,7 +34,7 @@ from lupin_twin.core.state import STATUS_OK, sure_species
 from lupin_twin.journal import sql
 from lupin_twin.journal.counts import deleted_ns
 from lupin_twin.journal.rows import last_row, named_numbers, sensor_names
-from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans
+from lupin_twin.journal.runs import cut, runs, span_at, spans
 from lupin_twin.journal.schema import SiteLog, one_view
 
 # Approximate cost of a full answer of writes, s.
@@ -51,11 +51,11 @@ def observed(connection: Any, start_ns: int, end_ns: int) -> PastWrites:
     axis = spans(runs(log.execute))
     found: list[PastWrite] = []
     for span in cut(axis, start_ns, end_ns):
-        query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
+        query = {"run": span.run, "start": span.start_ns, "end": span.end_ns}
         found += _of_scans(log.execute(sql.SCANS_OF_PERIOD, query).fetchall())
         found += _of_inspections(log.execute(sql.INSPECTIONS_OF_PERIOD, query).fetchall())
     found.sort(key=lambda write: (write.stamp_ns, write.number))
-    return PastWrites(log.journal_id, _axis(axis), tuple(found), 0, is_all=True)
+    return PastWrites(log.journal_id, axis, tuple(found), 0, is_all=True)
 
 
 def recent(connection: Any, at_ns: int) -> tuple[PastWrite, ...]:
@@ -68,7 +68,7 @@ def recent(connection: Any, at_ns: int) -> tuple[PastWrite, ...]:
     span = span_at(runs(log.execute), at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "start": 0, "end": at_ns + 1, "more": RECENT_COUNT - 1}
+    query = {"run": span.run, "start": 0, "end": at_ns + 1, "more": RECENT_COUNT - 1}
     scans = log.execute(sql.RECENT_SCANS, query).fetchall()
     inspections = log.execute(sql.RECENT_INSPECTIONS, query).fetchall()
     return recent_of([*_of_scans(scans), *_of_inspections(inspections)], at_ns)
@@ -86,7 +86,7 @@ def scans(
     span = span_at(runs(log.execute), at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "start": since_ns, "end": at_ns + 1}
+    query = {"run": span.run, "start": since_ns, "end": at_ns + 1}
     select = f"{sql.SCANS_OF_PERIOD} AND kind = 0 LIMIT {MAX_SCANS + 1}"
     rows = log.execute(select, query).fetchall()
     if len(rows) > MAX_SCANS:
@@ -111,12 +111,8 @@ def writes(connection: Any, request: WritesRequest) -> PastWrites:
     is_all = len(found) < request.max_count
     found = found[: request.max_count]
     last = max(newest_seq, after) if is_all else found[-1].number
-    axis = _axis(spans(runs(log.execute)))
+    axis = spans(runs(log.execute))
     return PastWrites(log.journal_id, axis, tuple(found), last, is_all)
-
-
-def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:
-    return tuple(RunSpan(span.run.id, span.start_ns, span.end_ns) for span in found)
 
 
 def _beginning(log: SiteLog, request: WritesRequest, high: int) -> int:
@@ -195,10 +191,10 @@ class Export:
         self._period = (start_ns, end_ns)
         self._tag_id = tag_id
         self._sensor_type = sensor_type
-        self._spans: deque[Span] | None = None
+        self._spans: deque[RunSpan] | None = None
         self._at_ns = 0
         self._length_ns = _FIRST_STRETCH_NS
-        self._run: Run | None = None
+        self._run: int | None = None
         self._places: dict[str, tuple[float, float]] = {}
         # By run, the last stamp that was already deleted when the first row was returned.
         self._deleted_ns: dict[int, int] = {}
@@ -215,17 +211,17 @@ class Export:
         if self._spans is None:
             self._spans = deque(cut(spans(runs(log.execute)), *self._period))
         if not self._has_begun:
-            self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
+            self._deleted_ns = {s.run: deleted_ns(log, s.run) for s in self._spans}
         while self._spans and self._spans[0].end_ns <= self._at_ns:
             self._spans.popleft()
         return self._stretch(log, self._spans[0]) if self._spans else None
 
-    def _stretch(self, log: SiteLog, span: Span) -> list[PastRow]:
+    def _stretch(self, log: SiteLog, span: RunSpan) -> list[PastRow]:
         if self._run != span.run:
             self._run, self._places = span.run, _places(log, span.run)
         start_ns = max(self._at_ns, span.start_ns)
-        horizon_ns = deleted_ns(log, span.run.id)
-        if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
+        horizon_ns = deleted_ns(log, span.run)
+        if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run]:
             why = "scans that come next were deleted while others were taken: begin again"
             raise NotRemembered(why)
         while True:
@@ -248,7 +244,7 @@ class Export:
 
     def _ask(self, log: SiteLog, select: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
         assert self._run is not None
-        query = {"run": self._run.id, "tag": self._tag_id, "start": start_ns, "end": end_ns}
+        query = {"run": self._run, "tag": self._tag_id, "start": start_ns, "end": end_ns}
         return list(log.execute(sql.of_tag(select, self._tag_id), query).fetchall())
 
     def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
@@ -267,9 +263,9 @@ class Export:
         return found
 
 
-def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
+def _places(log: SiteLog, run: int) -> dict[str, tuple[float, float]]:
     """Position of each tag: its first row in the run counts, copies included."""
-    found = log.execute(sql.PLACES, {"run": run.id}).fetchall()
+    found = log.execute(sql.PLACES, {"run": run}).fetchall()
     return {row[1]: (row[5], row[6]) for row in reversed(found)}
 
 

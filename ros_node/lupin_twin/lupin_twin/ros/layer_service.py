@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -21,6 +21,7 @@ from visualization_msgs.msg import MarkerArray
 
 from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
 from lupin_twin.core.interfaces import LAYERS, LAYERS_BELOW, PLANTERS, TAGS, Topic
+from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
 from lupin_twin.field.engine import (
@@ -45,7 +46,7 @@ from lupin_twin.ros.layers import (
 from lupin_twin.ros.parameters import naming
 from lupin_twin.ros.services import Services, Twin
 from lupin_twin.runtime.estimates import are_enough
-from lupin_twin.runtime.workers import JobQueue, Query, Workers
+from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
 
 # A topic is published no more often than this, s, and only when something has changed.
 PERIOD_S: Final = 1.0
@@ -185,7 +186,11 @@ class LayerService:
         def should_stop() -> bool:
             return not topic.is_wanted
 
-        def make(found: Sequence[TagPast]) -> bytes:
+        def work(_: ShouldStop) -> bytes:
+            found: Sequence[TagPast] = ()
+            # If the journal cannot be read, the field has no error.
+            with suppress(NotRemembered, CancelledError):
+                found = services.readings(sensor, now_ns, should_stop)
             grid = compute(should_stop)
             estimate, topic.estimate_s = None, 0.0
             if are_enough(found):
@@ -195,8 +200,7 @@ class LayerService:
                 topic.estimate_s = time.thread_time() - begun_s
             return cloud(points(grid, estimate), snapshot.stamp_ns, snapshot.frame_id)
 
-        look_up = partial(_or_nothing, services.readings(sensor, now_ns))
-        return Query(look_up, partial(self._publish, topic), make, _COST_S)
+        return Query(work, partial(self._publish, topic), _COST_S)
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The request for a sensor's field; its box, that of all tags, is the same for all."""
@@ -209,8 +213,7 @@ class LayerService:
         # Markers show ages: whether they have changed is known only when they are made.
         markers, snapshot = topic.markers, self._twin.snapshot()
         assert markers is not None
-        build = partial(self._workers.submit, lambda _: markers.build(snapshot), _COST_S)
-        return Query(build, partial(self._publish, topic), cost_s=_COST_S)
+        return Query(lambda _: markers.build(snapshot), partial(self._publish, topic), _COST_S)
 
     # --- the node's -------------------------------------------------------------------------
 
@@ -233,14 +236,3 @@ class LayerService:
         for topic in self._topics:
             topic.is_wanted = False
         self._workers.close()
-
-
-def _or_nothing(look_up: Callable[[], Future[Any]]) -> Future[Any]:
-    """The readings found; none if the journal cannot be read, and then a field has no error."""
-    found: Future[Any] = Future()
-    look_up().add_done_callback(
-        lambda search: found.set_result(
-            () if search.cancelled() or search.exception() else search.result()
-        )
-    )
-    return found

@@ -59,11 +59,9 @@ from lupin_twin.field.engine import (
     cost_s,
 )
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.field.idw import never
 from lupin_twin.journal import follow
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
-from lupin_twin.journal.queries import NEWEST_S_PER_TAG, SERIES_S, SERIES_S_PER_TAG, series
-from lupin_twin.journal.writes import WRITES_S
+from lupin_twin.journal.queries import NEWEST_S_PER_TAG, series
 from lupin_twin.ros import convert, convert_services
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.parameters import naming
@@ -88,8 +86,7 @@ from lupin_twin.runtime.workers import (
 Report = Callable[[str, Exception], None]
 Reply = Callable[[Any], None]
 
-# Worst-case cost of the message of a series, s of one core; and of that of all tags.
-MESSAGE_S: Final = SMALL_S
+# Worst-case cost of events of all tags, s of one core.
 EVERY_TAG_S: Final = 1.0
 
 
@@ -207,7 +204,7 @@ class Services:
                 grid = convert_services.field_response(grid)
             reply(grid)
 
-        return Query(partial(self._workers.submit, compute, cost), keep, cost_s=cost)
+        return Query(compute, keep, cost)
 
     # --- the past: its size is estimated from the current state ---------------------------------
 
@@ -215,50 +212,53 @@ class Services:
         at_ns, frame_id = convert.nanoseconds(request.at), self._twin.parameters.frame_id
         check_moment(at_ns, self._twin.now_ns())
         tags, items = self._twin.store.size
-        return Query(
-            self._search(lambda log: state_at(log, at_ns, frame_id), tags * STATE_S_PER_TAG),
-            reply,
-            convert_services.state_response,
-            tags * convert_services.TAG_S + items * convert_services.ITEM_S,
-        )
+        cost = tags * (STATE_S_PER_TAG + convert_services.TAG_S) + items * convert_services.ITEM_S
+        make = convert_services.state_response
+        return self._of_log(lambda log: state_at(log, at_ns, frame_id), make, reply, cost)
 
     def _history(self, request: Any, reply: Reply) -> Query:
         query, now_ns = convert_services.series_request(request), self._twin.now_ns()
-        is_of_all = query.tag_id == EVERY_TAG
-        tags = self._twin.store.size[0] if is_of_all else 0
-        return Query(
-            self._search(
-                lambda log: series(log, query, now_ns), SERIES_S + tags * SERIES_S_PER_TAG
-            ),
-            reply,
-            convert_services.series_response,
-            EVERY_TAG_S if is_of_all else MESSAGE_S,
-        )
+        cost = EVERY_TAG_S if query.tag_id == EVERY_TAG else SMALL_S
+        make = convert_services.series_response
+        return self._of_log(lambda log: series(log, query, now_ns), make, reply, cost)
 
     def _writes(self, request: Any, reply: Reply) -> Query:
         after = min(int(request.after), FOREVER_NS)
-        search = self._search(lambda log: follow.read(log, after), WRITES_S)
-        return Query(search, reply, convert_services.rows_response, MESSAGE_S)
+        # A copy must not wait for estimates, so this counts as small.
+        make = convert_services.rows_response
+        return self._of_log(lambda log: follow.read(log, after), make, reply, SMALL_S)
 
-    def _search(
-        self, search: Callable[[sqlite3.Connection], Any], cost_s: float
-    ) -> Callable[[], Future[Any]]:
-        return lambda: self._twin.memory.recall.query(lambda log, _: search(log), cost_s)
+    def _of_log(
+        self,
+        search: Callable[[sqlite3.Connection], Any],
+        make: Callable[[Any], Any],
+        reply: Reply,
+        cost: float,
+    ) -> Query:
+        """The query for a response that `make` makes of what is found in the journal."""
+        return Query(lambda stop: make(self._search(search, stop)), reply, cost)
+
+    def _search(self, search: Callable[[sqlite3.Connection], Any], stop: ShouldStop) -> Any:
+        return self._twin.memory.recall.answer(lambda log, _: search(log), stop)
 
     # --- estimates ------------------------------------------------------------------------------
 
-    def readings(self, sensor: str, at_ns: int, days: float = 1.0) -> Callable[[], Future[Any]]:
-        """Return a function that starts the query for a sensor's readings of some days."""
+    def readings(
+        self, sensor: str, at_ns: int, stop: ShouldStop, days: float = 1.0
+    ) -> list[TagPast]:
+        """Read a sensor's readings of some days up to a moment, in any thread."""
         day_s = self._twin.parameters.day_length_s
-        cost = days * self._twin.store.size[0] * (STATE_S_PER_TAG + NEWEST_S_PER_TAG)
-        return self._search(lambda log: readings_at(log, sensor, at_ns, day_s, days), cost)
+        found: list[TagPast] = self._search(
+            lambda log: readings_at(log, sensor, at_ns, day_s, days), stop
+        )
+        return found
 
     def estimate(
         self,
         request: EstimateRequest,
         now_ns: int,
         found: Sequence[TagPast],
-        should_stop: ShouldStop = never,
+        should_stop: ShouldStop,
     ) -> Estimate:
         """Make an estimate of the readings found, in any thread."""
         day_s = self._twin.parameters.day_length_s
@@ -269,23 +269,30 @@ class Services:
         twin, wanted = self._twin, convert_services.estimate_request_of(request)
         now_ns = twin.now_ns()
         check_moment(wanted.at_ns, now_ns)
+        sensor, at_ns = wanted.box.sensor_type, wanted.at_ns or now_ns
         tags = min(engine.MAX_TAGS, twin.store.size[0])
-        return Query(
-            self.readings(wanted.box.sensor_type, wanted.at_ns or now_ns),
-            reply,
-            lambda found: convert_services.response_of(self.estimate(wanted, now_ns, found)),
-            AS_OF * engine.cost_s(wanted, tags, twin.parameters.max_grid_cells),
-        )
+
+        def work(stop: ShouldStop) -> Any:
+            found = self.readings(sensor, at_ns, stop)
+            return convert_services.response_of(self.estimate(wanted, now_ns, found, stop))
+
+        cost = AS_OF * engine.cost_s(wanted, tags, twin.parameters.max_grid_cells)
+        return Query(work, reply, self._readings_s(1.0) + cost)
 
     def _report(self, request: Any, reply: Reply) -> Query:
         wanted, now_ns = convert_services.report_request_of(request), self._twin.now_ns()
         day_s, occupancy = self._twin.parameters.day_length_s, self._twin.occupancy_map
 
-        def make(found: Sequence[TagPast]) -> Any:
-            report = report_of(wanted, found, now_ns, day_s, occupancy=occupancy)
+        def work(stop: ShouldStop) -> Any:
+            found = self.readings(wanted.sensor_type, now_ns, stop, REPORT_DAYS)
+            report = report_of(wanted, found, now_ns, day_s, occupancy=occupancy, should_stop=stop)
             return convert_services.report_response(report)
 
-        return Query(self.readings(wanted.sensor_type, now_ns, REPORT_DAYS), reply, make, REPORT_S)
+        return Query(work, reply, self._readings_s(REPORT_DAYS) + REPORT_S)
+
+    def _readings_s(self, days: float) -> float:
+        """Approximate cost of readings, s of one core."""
+        return days * self._twin.store.size[0] * (STATE_S_PER_TAG + NEWEST_S_PER_TAG)
 
 
 # The beginning of rclpy's warning (7.1.6) that the middleware has dropped a response.

@@ -1,8 +1,7 @@
-"""Queries the journal about the past, in its own threads, over connections that cannot write.
+"""Queries the journal about the past, in any thread, over connections that cannot write.
 
-Small queries do not wait for large ones, and abandoned ones end. A query that cannot be answered is
-refused with a remedy. Nothing has to be restarted when the cause is gone: each search checks
-whether the file is still the one that is open.
+Abandoned queries end. A query that cannot be answered is refused with a remedy. Nothing has to be
+restarted when the cause is gone: each search checks whether the file is still the one that is open.
 """
 
 from __future__ import annotations
@@ -11,8 +10,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future
-from dataclasses import dataclass
+from concurrent.futures import CancelledError
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -20,7 +18,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.paths import files_of
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
-from lupin_twin.runtime.workers import ShouldStop, Workers
+from lupin_twin.runtime.workers import ShouldStop
 
 # A query that takes longer, s, is ended: while it reads, the WAL cannot be reused.
 MAX_S: Final = 60.0
@@ -28,7 +26,6 @@ MAX_S: Final = 60.0
 _STEPS: Final = 20_000
 # How long `close` waits, s, for running queries: the WAL is removed with the last connection.
 _END_S: Final = 1.0
-_CACHE_KB: Final = 8_000
 # Where, or when, to ask while the file is not ours to read.
 _ELSEWHERE: Final = {
     JournalState.IN_USE: "ask that twin",
@@ -40,16 +37,12 @@ AnswerT = TypeVar("AnswerT")
 Search = Callable[[Any, ShouldStop], AnswerT]
 
 
-@dataclass(frozen=True, slots=True)
-class _Open:
-    """A connection, and the files that it is to, see `files_of`."""
-
-    connection: sqlite3.Connection
-    files: tuple[int, int]
+# A connection, and the files that it is to, see `files_of`.
+_Open = tuple[sqlite3.Connection, tuple[int, int]]
 
 
 class Recall:
-    """Answers queries from construction to `close`, of any thread; callers limit how many wait.
+    """Answers queries from construction to `close`; callers limit how many run at once.
 
     `condition` returns, on any thread, the state of the journal and its path; `heal(damage)` is
     called when damage is found, on any thread.
@@ -64,42 +57,36 @@ class Recall:
         self._condition = condition
         self._heal = heal
         self._max_s = max_s
-        self._workers = Workers("memory")
         self._changed = threading.Condition()
         self._idle: list[_Open] = []
         self._running = 0
         self._is_closed = False
 
-    def query(self, search: Search[AnswerT], cost_s: float = 0.0) -> Future[AnswerT]:
-        """Run `search`, which is estimated to take `cost_s` s of one core; returns its future.
-
-        It sees the journal as of one moment. The future may raise `NotRemembered`, or what the
-        search raises; cancel it when nobody waits any more.
-        """
-        try:
-            return self._workers.submit(lambda stop: self._answer(search, stop), cost_s)
-        except RuntimeError:
-            refused: Future[AnswerT] = Future()
-            refused.set_exception(NotRemembered("the twin is ending"))
-            return refused
-
     def close(self) -> None:
-        """Drop waiting queries, and stop running ones, which are waited for briefly."""
-        self._workers.close()
+        """Refuse further queries, and stop running ones, which are waited for briefly."""
         with self._changed:
             self._is_closed = True
             self._changed.wait_for(lambda: not self._running, _END_S)
             idle, self._idle = self._idle, []
-        for opened in idle:
-            opened.connection.close()
+        for connection, _ in idle:
+            connection.close()
 
-    # --- in a thread of the workers -----------------------------------------------------------
+    def answer(self, search: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        """Run `search`, which sees the journal as of one moment.
 
-    def _answer(self, search: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
+        Raises:
+            NotRemembered: the journal cannot be read now, or not within the time limit.
+            CancelledError: `is_abandoned`, called every millisecond, was true, or the twin ends.
+            Exception: what the search raised.
+
+        """
         until_s = time.monotonic() + self._max_s
 
+        def is_over() -> bool:
+            return self._is_closed or is_abandoned()
+
         def should_stop() -> bool:
-            return is_abandoned() or time.monotonic() > until_s
+            return is_over() or time.monotonic() > until_s
 
         condition = self._condition()
         if then := _ELSEWHERE.get(condition.state):
@@ -115,7 +102,7 @@ class Recall:
         else:
             if not should_stop():
                 return answer
-        if is_abandoned():
+        if is_over():
             raise CancelledError
         raise NotRemembered(f"the journal did not answer within {self._max_s:g} s; ask for less")
 
@@ -123,11 +110,13 @@ class Recall:
         self, path: Path, inode: int, search: Search[AnswerT], should_stop: ShouldStop
     ) -> AnswerT:
         with self._changed:
+            if self._is_closed:
+                raise NotRemembered("the twin is ending")
             self._running += 1
         opened = None
         try:
             opened = self._take(path, inode)
-            connection = opened.connection
+            connection, _ = opened
             connection.set_progress_handler(should_stop, _STEPS)
             connection.execute("BEGIN")
             answer = search(connection, should_stop)
@@ -153,19 +142,17 @@ class Recall:
                 opened = self._idle.pop() if self._idle else None
             if opened is None:
                 break
-            if opened.files == files:
+            if opened[1] == files:
                 return opened
-            opened.connection.close()
-        connection = open_reader(path)
-        connection.execute(f"PRAGMA cache_size = -{_CACHE_KB}")
-        return _Open(connection, files)
+            opened[0].close()
+        return open_reader(path), files
 
     def _put_back(self, opened: _Open | None, *, is_sound: bool) -> None:
         with self._changed:
             if opened is not None and is_sound and not self._is_closed:
                 self._idle.append(opened)
             elif opened is not None:
-                opened.connection.close()
+                opened[0].close()
             self._running -= 1
             self._changed.notify_all()
 

@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
@@ -201,16 +202,14 @@ PACE_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Query:
-    """What to look up, how to make the answer from the result, and who gets the answer.
+    """What to do on a worker, and who gets the answer.
 
-    `look_up` begins the search. `make`, if given, is called with its result on a worker; `cost_s`
-    is its estimated cost, s of one core. `reply` gets the answer, or the exception. `since_s` is
-    when it was made, steady clock.
+    `work(should_stop)` makes the answer; `cost_s` is its estimated cost, s of one core. `reply`
+    gets the answer, or the exception. `since_s` is when it was made, steady clock.
     """
 
-    look_up: Callable[[], Future[Any]]
+    work: Callable[[ShouldStop], Any]
     reply: Callable[[Any], None]
-    make: Callable[[Any], Any] | None = None
     cost_s: float = 0.0
     since_s: float = field(default_factory=time.monotonic)
 
@@ -298,37 +297,16 @@ class JobQueue:
             query = lane.waiting.popleft()
             lane.begun_s = now_s
             lane.under_way += 1
-            self._look_up(query)
+            job = self._workers.submit(query.work, query.cost_s)
+            job.add_done_callback(partial(self._put, query))
 
-    def _look_up(self, query: Query) -> None:
-        def put(answer: Any) -> None:
-            self._done.put((query, answer))
-            self._wake()
-
-        def put_result(future: Future[Any]) -> None:
-            try:
-                answer = future.result()
-            except Exception as error:  # noqa: BLE001  # handed to whoever waits
-                answer = error
-            put(answer)
-
-        def make(search: Future[Any]) -> None:
-            # This runs in the thread that searched, which is not for making messages.
-            try:
-                found, made = search.result(), query.make
-                assert made is not None
-                making = self._workers.submit(lambda _: made(found), query.cost_s)
-            except Exception as error:  # noqa: BLE001  # handed to whoever waits
-                put(error)
-            else:
-                making.add_done_callback(put_result)
-
+    def _put(self, query: Query, job: Future[Any]) -> None:
         try:
-            search = query.look_up()
+            answer = job.result()
         except Exception as error:  # noqa: BLE001  # handed to whoever waits
-            put(error)
-        else:
-            search.add_done_callback(put_result if query.make is None else make)
+            answer = error
+        self._done.put((query, answer))
+        self._wake()
 
 
 @dataclass(slots=True)

@@ -10,7 +10,7 @@ import { useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectLatestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
 import { useNow } from '../widgets/useNow';
-import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
+import { fetchLines, type Lines, modelOf } from './model';
 
 /** Interval between requests for the same lines, ms; longer for many lines. */
 const PACE_MS = 3_000;
@@ -18,92 +18,80 @@ const PACE_A_LINE_MS = 1_000;
 /** Received data are in the journal within 100 ms, and in another host's copy soon after. */
 const WRITTEN_MS = 1_000;
 
-export type FetchedLines = ReturnType<typeof useLines>;
+export type Charts = ReturnType<typeof useCharts>;
 
 /**
- * These lines over the time bar's period: refetched after a visit to one of the tags, on each
- * connection, and at intervals.
+ * A chart for each sensor, with a line for each tag, over the time bar's period: refetched after a visit
+ * to one of the tags, on each connection, and at intervals.
  */
-export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false) {
+export function useCharts(
+  sensors: readonly string[],
+  tagIds: readonly string[],
+  points: number,
+  hasDayBefore = false,
+) {
+  const moment = useApp((state) => state.view.moment);
+  const catalogue = useApp(selectCatalogue);
+  const both = useApp(selectCatalogues);
+  const species = useApp((state) =>
+    tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
+  ).split('\u0000');
   const period = useApp((state) => state.view.period);
   const { value: known, state: reaching } = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const dayS = useApp((state) => (hasDayBefore ? selectDayS(state) : null));
+  /** The time of the twin, ROS seconds. */
   const nowS = rosNow(store.get(), useNow());
-  const visits = useVisits(pairs);
+  const visits = useVisits(tagIds);
   const answered = useRef('');
   const oldest = period.kind === 'all' ? (known?.reach?.from ?? null) : null;
   // How far all of it reaches is not known yet.
   const isEarly = period.kind === 'all' && known === null && reaching === 'waiting';
+  /** Null while the time is not known. */
   const span = nowS === null ? null : spanOf(period, nowS, oldest);
-  const group = [JSON.stringify(period), points, dayS, ...pairs.map(pairKey)].join('\u0001');
-  const fetched = useFetched<Lines>(
+  const group = JSON.stringify([period, points, dayS, sensors, tagIds]);
+  // During a refetch, the old lines stay.
+  const { value, state, message } = useFetched<Lines>(
     nowS === null || !isOpen || points === 0 || isEarly
       ? null
       : {
           key: [group, epoch, oldest, turnOf(period, nowS), visits].join('\u0001'),
           group,
-          paceMs: Math.max(PACE_MS, PACE_A_LINE_MS * pairs.length),
+          paceMs: Math.max(PACE_MS, PACE_A_LINE_MS * sensors.length * tagIds.length),
           run: async (signal) => {
             if (answered.current === group) await pause(WRITTEN_MS);
             // The twin's time has advanced since the task was made.
             const atS = rosNow(store.get(), now()) ?? nowS;
-            const query = { pairs, span: spanOf(period, atS, oldest), nowS: atS, points, dayS };
-            const lines = await fetchLines(query, signal);
+            const then = { span: spanOf(period, atS, oldest), nowS: atS };
+            const lines = await fetchLines({ sensors, tagIds, points, dayS, ...then }, signal);
             answered.current = group;
             return lines;
           },
         },
     PACE_MS,
   );
-  return {
-    lines: fetched.value ?? NO_LINES,
-    /** Null while the time is not known. */
-    span,
-    /** The time of the twin, ROS seconds. */
-    nowS,
-    /** During a refetch, the old lines stay. */
-    state: fetched.state,
-    message: fetched.message,
-  };
-}
-
-/** The charts of plans of the same tags, as far as their lines have arrived. */
-export function useCharts(plans: readonly Plan[], points: number, hasDayBefore = false) {
-  const moment = useApp((state) => state.view.moment);
-  const catalogue = useApp(selectCatalogue);
-  const both = useApp(selectCatalogues);
-  const species = useSpeciesOf(plans[0]?.tagIds ?? []);
-  const pairs = useMemo(
-    () => plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor }))),
-    [plans],
-  );
-  const fetched = useLines(pairs, points, hasDayBefore);
-  const { lines, span, nowS } = fetched;
-  const models = useMemo(
-    () =>
-      span
-        ? plans.map((plan) => modelOf(catalogue, both, plan, species, lines, span, moment, nowS))
-        : [],
-    [catalogue, both, plans, species, lines, span, moment, nowS],
-  );
-  return { fetched, models };
+  const models = span
+    ? sensors.map((sensor) =>
+        modelOf(catalogue, both, sensor, tagIds, species, value ?? [], span, moment, nowS),
+      )
+    : [];
+  return { models, span, state, message };
 }
 
 /** Changes when one of the tags is visited; not in the past, nor for a period that has ended. */
-function useVisits(pairs: readonly Pair[]): string {
+function useVisits(tagIds: readonly string[]): string {
   const newest = useApp((state) =>
-    state.view.moment === null && endsNow(state.view.period) ? visitsOf(state, pairs) : null,
+    state.view.moment === null && endsNow(state.view.period) ? visitsOf(state, tagIds) : null,
   );
   const [visits, setVisits] = useState('');
   if (newest !== null && newest !== visits) setVisits(newest);
   return visits;
 }
 
-const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
+const visitsOf = (state: AppState, tagIds: readonly string[]): string =>
   JSON.stringify(
-    pairs.map(({ tagId }) => {
+    tagIds.map((tagId) => {
       const wire = selectLatestTag(state, tagId)?.wire;
       return [wire?.last_observed, wire?.last_try];
     }),
@@ -139,13 +127,6 @@ export function useSensorsOf(tagId: string): readonly string[] {
     () => inOrder(catalogue, names === '' ? [] : names.split('\u0000')),
     [catalogue, names],
   );
-}
-
-function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
-  const species = useApp((state) =>
-    tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
-  );
-  return useMemo(() => species.split('\u0000'), [species]);
 }
 
 function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[] {

@@ -1,0 +1,116 @@
+import { Fragment, type JSX } from 'react';
+
+import { tagsOf, tagsText } from '../../alarms/arrange';
+import { showAlarm } from '../../alarms/follow';
+import { countsNow, selectNow, todoNow } from '../../alarms/latest';
+import { groupOf, oldestOf, unacknowledged, type AlarmList, type Item } from '../../alarms/list';
+import { partsText, whereText } from '../../alarms/words';
+import type { Alarm } from '../../contract/types';
+import { airOf } from '../../domain/health';
+import { useApp } from '../../store/app';
+import { selectCatalogue } from '../../store/derived';
+import { S } from '../../strings';
+import { Icon } from '../../widgets/controls';
+import { HealthMark } from '../HealthMark';
+import { AlarmFacts, AlarmTimes, AlarmTodo, useValues } from './AlarmFacts';
+import { AlarmTools } from './AlarmTools';
+import { useWhoAcknowledged } from './people';
+
+/**
+ * Heading of alarms that share a cause, aligned with their rows: what is wrong, what to do, at which tags,
+ * and the values of the worst one. A click shows or hides the rows; of a single tag, it shows the tag too.
+ */
+export function CauseHeading({
+  cause,
+  items,
+  group,
+  isOpen,
+  onToggle,
+}: {
+  cause: string;
+  /** The worst first; if resolved, the last one. */
+  items: readonly Item[];
+  group: keyof AlarmList;
+  isOpen: boolean;
+  onToggle: () => void;
+}): JSX.Element | null {
+  // While the order is held, alarms that left the group are still listed.
+  const own = items.filter((item) => groupOf(item) === group);
+  const shown = own.length > 0 ? own : items;
+  const [first] = shown;
+  const tags = tagsOf(items);
+  const isOfOne = tags.length === 1;
+  const sensors = useApp(selectCatalogue);
+  const who = useWhoAcknowledged(isOfOne && first ? first.alarm : null);
+  // As text, so that a new state with the same counts does not re-render.
+  const key = useApp((state) => JSON.stringify(countsNow(state, shown)));
+  const counts = JSON.parse(key) as ReturnType<typeof countsNow>;
+  const todo = useApp((state) => todoNow(state, shown));
+  const parts = useApp((state) => partsText(shown, sensors, (alarm) => selectNow(state, alarm)));
+  const [worst] = counts;
+  if (!first || !worst) return null;
+  const { alarm } = first;
+  const [verdict] = worst;
+  const isOver = group === 'resolved';
+  // What was resolved last stands first.
+  const times = isOver ? alarm : (oldestOf(shown) ?? alarm);
+  const waiting = group === 'active' ? unacknowledged(own) : [];
+  const status = own.length === 0 ? S.alarmCount(0) : (who ?? S.healthAcknowledged);
+  return (
+    <div
+      className="alarm-cause"
+      data-cause={cause}
+      data-health={verdict}
+      data-where={isOfOne ? alarm.tag_id : undefined}
+    >
+      <button
+        type="button"
+        className="alarm-go"
+        aria-expanded={isOpen}
+        onClick={() => {
+          onToggle();
+          if (isOfOne) showAlarm(alarm);
+        }}
+      >
+        <AlarmTimes alarm={times} first={null} verdict={verdict} isOver={isOver} />
+        <span className="alarm-text">
+          <span>
+            <strong>{isOfOne ? S.alarmWhat(whereText(alarm), cause) : cause}</strong>{' '}
+            <span className="alarm-many">
+              {S.alarmCount(own.length)}{' '}
+              {!isOfOne &&
+                counts.length > 1 &&
+                counts.map(([each, count]) => (
+                  <Fragment key={each}>
+                    <HealthMark verdict={each} word={false} /> {count}{' '}
+                  </Fragment>
+                ))}
+              <Icon name="chevron" />
+            </span>
+          </span>
+          {group === 'active' && <AlarmTodo text={todo} />}
+          <span className="alarm-facts faint">
+            {isOfOne && airOf(alarm.reason) ? parts : tagsText(tags)}
+          </span>
+        </span>
+        <Values alarm={alarm} of={isOfOne ? '' : whereText(alarm)} />
+      </button>
+      {isOver ? (
+        // To align with the rows' columns.
+        <div className="alarm-tools" />
+      ) : (
+        <AlarmTools
+          items={shown}
+          waiting={waiting}
+          name={cause}
+          // By whom, each row says.
+          status={waiting.length > 0 ? null : group === 'active' ? status : ''}
+        />
+      )}
+    </div>
+  );
+}
+
+const Values = ({ alarm, of }: { alarm: Alarm; of: string }): JSX.Element => (
+  <AlarmFacts alarm={alarm} values={useValues(alarm)} of={of} />
+);

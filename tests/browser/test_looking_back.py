@@ -222,7 +222,16 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
         for each in buttons.all():
             expect(each).to_be_in_viewport(ratio=1)
             assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth"), width
-    # Beside a card, the bar is the way through the past.
+    # Beside a card, the bar is the way through the past; a map would be a stamp.
     hmi.turn(f"at={hour.begun_s + 700}&tag=a")
     expect(hmi.card("a")).to_be_in_viewport()
+    expect(hmi.map).to_be_hidden()
     expect(slider(hmi)).to_be_in_viewport(ratio=1)
+    # On its side, the bar is beside the map, and the menu scrolls to its end.
+    hmi.turn(f"at={hour.begun_s + 700}")
+    hmi.resize(844, 390)
+    expect(slider(hmi)).to_be_in_viewport(ratio=1)
+    buttons.first.click()
+    last = hmi.page.locator(".menu-list > *").last
+    last.scroll_into_view_if_needed()
+    expect(last).to_be_in_viewport(ratio=1)

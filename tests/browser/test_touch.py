@@ -111,9 +111,24 @@ def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:
     expect(menu).to_be_in_viewport(ratio=1)
 
 
-def test_charts_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+def test_charts_are_whole_and_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
     phone.go("chart.tag=10&tag=10", "?lang=nl")
-    expect(phone.page.get_by_role("combobox", name="Meetpunten")).to_have_value("10")
+    menu = phone.page.get_by_role("combobox", name="Meetpunten")
+    expect(menu).to_have_value("10")
+    # An iPhone would zoom to smaller text.
+    expect(menu).to_have_css("font-size", "16px")
+
+    # One has room: whole, above the title of the next.
+    phone.resize(360, 560)
+    plots = phone.test_id("plot")
+    expect(plots).to_have_count(5)
+
+    def are_whole() -> bool:
+        edge = place(phone.page.locator(".chart-body")).bottom
+        return place(plots.first).bottom < edge <= place(plots.nth(1)).top + 1
+
+    phone.expect(are_whole, "no chart that the edge cuts")
+    phone.resize(**PHONE)
     head = phone.page.locator(".chart-view > header")
     # More lines until its styles and all its parts are there.
     phone.expect(lambda: place(head).bottom - place(head).top < 60, "one line of tools")

@@ -237,13 +237,14 @@ function groupText(sites: readonly Site[]): string {
   const texts = FILTERS.filter((each) => each !== 'all' && each !== 'healthy' && counts[each] > 0);
   return [
     String(sites.length),
-    ...texts.map((each) => `${counts[each]} ${filterText(each)}`),
+    ...texts.map((each) => `${counts[each]} ${filterText(each, counts[each])}`),
     ...(alarms > 0 ? [S.alarmCount(alarms)] : []),
   ].join(' · ');
 }
 
-function filterText(filter: Filter): string {
-  return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
+function filterText(filter: Filter, count = 1): string {
+  if (filter === 'all' || filter === 'silent') return words[filter];
+  return (count === 1 ? S.health : S.healthMany)[filter];
 }
 
 function List({ sites, ...listed }: Listed & { sites: readonly Site[] }): JSX.Element {

@@ -157,7 +157,7 @@ export function DoNow({
               <button
                 type="button"
                 className="do-more"
-                data-short={S.attentionMore(rest)}
+                data-short={`+ ${rest}`}
                 onClick={() => {
                   act(withList('tags'));
                 }}
@@ -229,7 +229,7 @@ function Todo({
   const [reason] = task.reasons;
   // Other causes of the same task are on the card.
   const [cause = []] = byCause(task.reasons);
-  const why = S.healthDriver(shown(tagId, 24), useCauseText(cause, true, tagId));
+  const why = S.alarmWhat(S.card(shown(tagId, 24)), useCauseText(cause, true, tagId));
   const since = useSince(task);
   const isCurrent = useApp(selectIsCurrent);
   return (

@@ -142,7 +142,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         ) : view === 'sites' ? (
           <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} causeText={causeText} />
         ) : (
-          <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
+          <Suspense fallback={<p className="fleet-empty">{S.emptyConnecting}</p>}>
             {view === 'alarms' && <Alarms shown={shown} />}
             {view === 'compare' && <Compare shown={shown} />}
             {view === 'report' && <Report shown={shown} />}
@@ -163,7 +163,7 @@ function asOfWhen({ archive, lostAt }: Seen): number | null {
 }
 
 function nothingText({ archive, sites }: Seen): string {
-  if (archive === null) return words.connecting;
+  if (archive === null) return S.emptyConnecting;
   if (sites.size > 0) return words.noMatch;
   return archive.is_reachable ? words.empty : '';
 }
@@ -324,7 +324,7 @@ function originText({ origin }: Site): string | null {
 
 function silentText(site: Site, asOf: number | null): string {
   const at = site.heardAt;
-  if (at === null) return words.neverForwarded;
+  if (at === null) return words.silent;
   const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
   return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }

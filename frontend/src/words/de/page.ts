@@ -64,7 +64,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
   },
 
-  serverBusy: 'Der Server ist überlastet oder nicht erreichbar.',
+  serverBusy: 'Server überlastet oder nicht erreichbar',
   unread: (count) =>
     count === 1
       ? 'Eine Nachricht vom Server war nicht lesbar und wurde verworfen.'

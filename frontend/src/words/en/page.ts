@@ -66,7 +66,7 @@ export const PAGE = {
   },
 
   /** Replaces the server's error if it may recover soon. */
-  serverBusy: 'The server is busy or unreachable.',
+  serverBusy: 'Server busy or unreachable',
   unread: (count: number): string =>
     count === 1
       ? 'A message from the server could not be read and was dropped.'

@@ -63,7 +63,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     thread_dead: 'El hilo de ROS del puente («bridge») ha terminado; su registro dice por qué.',
   },
 
-  serverBusy: 'El servidor está sobrecargado o no responde.',
+  serverBusy: 'Servidor sobrecargado o inaccesible',
   unread: (count) =>
     count === 1
       ? 'Un mensaje del servidor no se pudo leer y se descartó.'

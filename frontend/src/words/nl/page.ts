@@ -64,7 +64,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
   },
 
-  serverBusy: 'De server is overbelast of niet bereikbaar.',
+  serverBusy: 'Server overbelast of niet bereikbaar',
   unread: (count) =>
     count === 1
       ? 'Een bericht van de server was onleesbaar en is genegeerd.'

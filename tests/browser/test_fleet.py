@@ -81,7 +81,8 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         cards = page.locator(".fleet-site")
         expect(cards.nth(0)).to_contain_text("Critical")
         expect(cards.nth(0)).to_contain_text("5 alarms")
-        expect(cards.nth(0)).to_contain_text("Temperature too high · 5\u00a0tags")
+        # Few greenhouses: what to do, too, and a large map.
+        expect(cards.nth(0)).to_contain_text("Temperature too high · 5\u00a0tagsVentilate or shade")
         expect(cards.nth(1)).to_contain_text("Silent since")
         expect(cards.nth(1)).to_contain_text("Last known: Healthy")
         # That it is silent.
@@ -91,6 +92,7 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
             image = card.locator("img.fleet-map")
             expect(image).to_have_js_property("complete", value=True)
             assert image.evaluate("image => image.naturalWidth > 0")
+            assert image.evaluate("image => Math.max(image.width, image.height) > 88")
         expect(cards.nth(1)).not_to_have_attribute("data-health", "healthy")
         expect(cards.nth(2)).to_contain_text("No alarms")
         # No row has a source; from two groups on, there are headings.
@@ -118,6 +120,10 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         expect(page.locator(".fleet-back")).to_have_count(0)
     with opened(browser, f"{sites.url}/sites/silent/") as page:
         expect(page.get_by_role("banner")).not_to_contain_text("Live", timeout=10_000)
+    with opened(browser, f"{sites.url}?lang=de", viewport=PHONE) as page:
+        expect(page.locator(".fleet-site")).to_have_count(3)
+        for words in page.locator(".fleet-filters").all():
+            assert words.evaluate("it => it.scrollWidth <= it.clientWidth"), "a tab is cut"
     with opened(browser, f"{sites.url}?kiosk&lang=de", viewport=PHONE) as page:
         expect(page.get_by_role("heading", level=1)).to_have_text("Gewächshäuser")
         expect(page.get_by_role("searchbox")).to_have_count(0)

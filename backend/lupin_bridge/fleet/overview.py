@@ -43,7 +43,8 @@ _STYLE: Final = (
 def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
     """An SVG with a path for each verdict, the worst on top; empty: no tag has a pose.
 
-    It is upright if the greenhouse is longer along y. A tag that is far off the others is left out, or the others would become one dot.
+    It is upright if the greenhouse is longer along y. A tag that is far off the others is left out,
+    or the others would become one dot.
     """
     every = [
         (pose.x, pose.y, healths[tag.tag_id].verdict)

@@ -55,7 +55,7 @@ test('each visit subscribes anew: the push service may have ended the subscripti
   render(<NotifySettings />);
   // A grower who relies on the phone learns whether the bridge reaches it.
   screen.getByText(/while this page is open in the background\.$/);
-  await screen.findByText(/Critical alarms also come while it is closed\.$/);
+  await screen.findByText(/Critical alarms also arrive while it is closed\.$/);
   expect(log).toEqual([options, subscribed]);
   await setNotify(false);
   expect(isPushed.get()).toBe(false);

@@ -16,7 +16,7 @@ import { LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
 
 test.each([
   ['temperature_24h_mean', 4_680, 'Needs 24 h of readings; 1\u00a0h 18\u00a0min so far'],
-  ['daily_light_integral', 90_000, 'Needs 24 h of readings without a gap of over 3 h'],
+  ['daily_light_integral', 90_000, 'Needs 24 h of readings without a gap longer than 3 h'],
   ['temperature', 4_680, '–'],
 ])('without a value %s says what it lacks', (sensor, known, expected) => {
   expect(said(sensor, known)).toBe(expected);

@@ -142,7 +142,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         ) : view === 'sites' ? (
           <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} causeText={causeText} />
         ) : (
-          <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
+          <Suspense fallback={<p className="fleet-empty">{S.emptyConnecting}</p>}>
             {view === 'alarms' && <Alarms shown={shown} />}
             {view === 'compare' && <Compare shown={shown} />}
             {view === 'report' && <Report shown={shown} />}
@@ -163,7 +163,7 @@ function asOfWhen({ archive, lostAt }: Seen): number | null {
 }
 
 function nothingText({ archive, sites }: Seen): string {
-  if (archive === null) return words.connecting;
+  if (archive === null) return S.emptyConnecting;
   if (sites.size > 0) return words.noMatch;
   return archive.is_reachable ? words.empty : '';
 }
@@ -237,13 +237,14 @@ function groupText(sites: readonly Site[]): string {
   const texts = FILTERS.filter((each) => each !== 'all' && each !== 'healthy' && counts[each] > 0);
   return [
     String(sites.length),
-    ...texts.map((each) => `${counts[each]} ${filterText(each)}`),
+    ...texts.map((each) => `${counts[each]} ${filterText(each, counts[each])}`),
     ...(alarms > 0 ? [S.alarmCount(alarms)] : []),
   ].join(' · ');
 }
 
-function filterText(filter: Filter): string {
-  return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
+function filterText(filter: Filter, count = 1): string {
+  if (filter === 'all' || filter === 'silent') return words[filter];
+  return (count === 1 ? S.health : S.healthMany)[filter];
 }
 
 function List({ sites, ...listed }: Listed & { sites: readonly Site[] }): JSX.Element {
@@ -323,7 +324,7 @@ function originText({ origin }: Site): string | null {
 
 function silentText(site: Site, asOf: number | null): string {
   const at = site.heardAt;
-  if (at === null) return words.neverForwarded;
+  if (at === null) return words.silent;
   const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
   return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }

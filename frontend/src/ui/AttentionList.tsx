@@ -86,8 +86,8 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   const { tagId, reasons } = worst;
   const [reason] = reasons;
   const { verdict } = reason;
-  const why = S.healthDriver(
-    shown(tagId, 16),
+  const why = S.alarmWhat(
+    S.card(shown(tagId, 16)),
     useCauseText(byCause(reasons)[0] ?? [], true, tagId),
   );
   const since = useSince(worst);

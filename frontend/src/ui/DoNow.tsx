@@ -227,7 +227,7 @@ function Todo({
   const [reason] = task.reasons;
   // Other causes of the same task are on the card.
   const [cause = []] = byCause(task.reasons);
-  const why = S.healthDriver(shown(tagId, 24), useCauseText(cause, true, tagId));
+  const why = S.alarmWhat(S.card(shown(tagId, 24)), useCauseText(cause, true, tagId));
   const since = useSince(task);
   const isCurrent = useApp(selectIsCurrent);
   return (

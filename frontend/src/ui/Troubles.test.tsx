@@ -73,7 +73,7 @@ test('what the twin does not hear is told with the remedy, to its end', () => {
   goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet.'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
-    `Some data is not received. More about this${why}; use TRANSIENT_LOCAL. Nothing has come yet. `,
+    `Some data does not arrive. More about this${why}; use TRANSIENT_LOCAL. Nothing has come yet. `,
   ]);
 });
 
@@ -104,7 +104,7 @@ test.each([
     'Recording has failed.',
     /If the disk is full, free space; if it is read-only, make it writable/,
   ],
-  ['slow', 'Recording is behind.', /Data waits in memory/],
+  ['slow', 'Recording has fallen behind.', /Data waits in memory/],
   ['upgrading', 'The recording of an older version is being upgraded.', /which may take minutes/],
   [
     'in_use',
@@ -112,7 +112,7 @@ test.each([
     /Stop one of them, or give/,
   ],
   ['foreign', 'This twin is not recording: it cannot read its file.', /Give the twin another file/],
-  ['off', 'Recording is off.', /After a restart, all earlier data is lost/],
+  ['off', 'Recording is off.', /A restart loses all earlier data/],
 ] as const)('a journal that is %s is reported, with why and what to do', (state, title, hint) => {
   render(<Troubles />);
   journal({ state, detail: 'database or disk is full' });

@@ -127,7 +127,11 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
 };
 
 /** Counted nouns whose singular and plural are the same. */
-const ONE_AND_MANY: Readonly<Record<string, readonly string[]>> = { de: [], nl: [], es: [] };
+const ONE_AND_MANY: Readonly<Record<string, readonly string[]>> = {
+  de: ['timebarCounts'],
+  nl: ['timebarCounts'],
+  es: ['timebarCounts'],
+};
 
 const isWorded = (text: string): boolean =>
   /\p{L}{2}/u.test(text.replaceAll(/⟦[^⟧]*⟧/g, '').replaceAll('Lupin twin', ''));

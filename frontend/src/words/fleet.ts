@@ -15,7 +15,6 @@ const ENGLISH = {
   nothingReceived: 'Nothing received yet',
   silentSince: (time: string): string => `Silent since ${time}`,
   asOf: (time: string): string => `As of ${time}`,
-  neverForwarded: 'Nothing sent yet',
   lastKnown: (status: string): string => `Last known: ${status}`,
   archiveDown: (time: string): string =>
     `The archive has not answered since ${time}. The last known state is shown.`,
@@ -25,9 +24,8 @@ const ENGLISH = {
   alarmList: 'Alarms of all greenhouses, the worst first',
   others: 'Other greenhouses',
   compare: 'Compare',
-  connecting: 'Connecting…',
   empty: 'No greenhouse sends data to this archive yet.',
-  noMatch: 'No greenhouse matches.',
+  noMatch: 'No greenhouse matches the filter.',
   shown: (count: number, all: number): string => `${count} of ${all} greenhouses shown`,
 };
 
@@ -38,7 +36,7 @@ const GERMAN: FleetWords = {
   filter: 'Nach Zustand filtern',
   all: 'Alle',
   silent: 'Kein Signal',
-  list: 'Gewächshäuser, die schlimmsten zuerst',
+  list: 'Gewächshäuser, die kritischsten zuerst',
   alarmsBeingRead: 'Alarme werden geladen',
   noAlarms: 'Keine Alarme',
   judging: 'Wird beurteilt',
@@ -46,20 +44,18 @@ const GERMAN: FleetWords = {
   nothingReceived: 'Noch nichts empfangen',
   silentSince: (time) => `Kein Signal seit ${time}`,
   asOf: (time) => `Stand ${time}`,
-  neverForwarded: 'Noch nie gesendet',
   lastKnown: (status) => `Zuletzt bekannt: ${status}`,
   archiveDown: (time) =>
-    `Das Archiv antwortet seit ${time} nicht. Sie sehen, was zuletzt bekannt war.`,
+    `Das Archiv antwortet seit ${time} nicht. Angezeigt wird der letzte bekannte Stand.`,
   disconnected: (time) =>
-    `Seit ${time} keine Verbindung zum Server. Sie sehen, was zuletzt bekannt war.`,
+    `Seit ${time} keine Verbindung zum Server. Angezeigt wird der letzte bekannte Stand.`,
   sites: 'Gewächshäuser',
-  alarmList: 'Alarme aller Gewächshäuser, die schlimmsten zuerst',
+  alarmList: 'Alarme aller Gewächshäuser, die kritischsten zuerst',
   others: 'Andere Gewächshäuser',
   compare: 'Vergleichen',
-  connecting: 'Verbindung wird aufgebaut …',
   empty: 'Noch kein Gewächshaus sendet Daten an dieses Archiv.',
-  noMatch: 'Kein Gewächshaus passt dazu.',
-  shown: (count, all) => `${count} von ${all} Gewächshäusern`,
+  noMatch: 'Kein Gewächshaus passt zum Filter.',
+  shown: (count, all) => `${count} von ${all} Gewächshäusern angezeigt`,
 };
 
 const DUTCH: FleetWords = {
@@ -75,20 +71,18 @@ const DUTCH: FleetWords = {
   nothingReceived: 'Nog niets ontvangen',
   silentSince: (time) => `Geen signaal sinds ${time}`,
   asOf: (time) => `Stand van ${time}`,
-  neverForwarded: 'Nog niets gestuurd',
   lastKnown: (status) => `Laatst bekend: ${status}`,
   archiveDown: (time) =>
-    `Het archief antwoordt niet meer sinds ${time}. U ziet wat het laatst bekend was.`,
+    `Het archief antwoordt niet meer sinds ${time}. U ziet de laatst bekende stand.`,
   disconnected: (time) =>
-    `Sinds ${time} geen verbinding met de server. U ziet wat het laatst bekend was.`,
+    `Sinds ${time} geen verbinding met de server. U ziet de laatst bekende stand.`,
   sites: 'Kassen',
   alarmList: 'Alarmen van alle kassen, de ergste eerst',
   others: 'Andere kassen',
   compare: 'Vergelijken',
-  connecting: 'Verbinden…',
   empty: 'Nog geen kas stuurt gegevens naar dit archief.',
-  noMatch: 'Geen kas voldoet hieraan.',
-  shown: (count, all) => `${count} van ${all} kassen`,
+  noMatch: 'Geen kas voldoet aan het filter.',
+  shown: (count, all) => `${count} van ${all} kassen getoond`,
 };
 
 const SPANISH: FleetWords = {
@@ -104,7 +98,6 @@ const SPANISH: FleetWords = {
   nothingReceived: 'Aún no se ha recibido nada',
   silentSince: (time) => `Sin señal desde ${time}`,
   asOf: (time) => `Datos: ${time}`,
-  neverForwarded: 'Sin envíos aún',
   lastKnown: (status) => `Último estado conocido: ${status}`,
   archiveDown: (time) =>
     `El archivo central no responde desde ${time}. Se muestra el último estado conocido.`,
@@ -114,10 +107,9 @@ const SPANISH: FleetWords = {
   alarmList: 'Alarmas de todos los invernaderos, las peores primero',
   others: 'Otros invernaderos',
   compare: 'Comparar',
-  connecting: 'Conectando…',
   empty: 'Ningún invernadero envía aún datos a este archivo central.',
-  noMatch: 'Ningún invernadero coincide.',
-  shown: (count, all) => `${count} de ${all} invernaderos`,
+  noMatch: 'Ningún invernadero coincide con el filtro.',
+  shown: (count, all) => `${count} de ${all} invernaderos mostrados`,
 };
 
 const WORDS: Readonly<Record<Language, FleetWords>> = {

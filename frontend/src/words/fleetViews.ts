@@ -12,7 +12,7 @@ const ENGLISH = {
   draw: (site: string): string => `Show ${site}`,
   someCompared: (count: number, all: number): string =>
     `${count} of ${all} greenhouses are compared, the worst first. Search to choose others.`,
-  notFetched: (reason: string): string => `This could not be fetched: ${reason}`,
+  notFetched: (reason: string): string => `This could not be loaded: ${reason}`,
   hours: (count: number): string => `Last ${count} hours`,
   scans: 'Scans',
   failed: 'Failed attempts',
@@ -31,12 +31,12 @@ const GERMAN: In<typeof ENGLISH> = {
   acknowledged: (name, at) => `quittiert von ${name}, ${at}`,
   moreAlarms: (count) => `${count} weitere: siehe die Seiten der Gewächshäuser.`,
   deviation: 'Abweichung',
-  deviationHint: 'Wie weit ein Gewächshaus im Mittel vom Median aller entfernt ist.',
+  deviationHint: 'Wie weit ein Gewächshaus im Mittel vom Median aller Gewächshäuser abweicht.',
   median: 'Median aller; Band: die mittlere Hälfte',
   draw: (site) => `${site} anzeigen`,
   someCompared: (count, all) =>
-    `${count} von ${all} Gewächshäusern werden verglichen, die schlimmsten zuerst. Suchen Sie nach anderen.`,
-  notFetched: (reason) => `Das ließ sich nicht abrufen: ${reason}`,
+    `${count} von ${all} Gewächshäusern werden verglichen, die kritischsten zuerst. Andere über die Suche wählen.`,
+  notFetched: (reason) => `Das konnte nicht geladen werden: ${reason}`,
   hours: (count) => `Letzte ${count} Stunden`,
   scans: 'Messungen',
   failed: 'Fehlgeschlagene Versuche',
@@ -60,7 +60,7 @@ const DUTCH: In<typeof ENGLISH> = {
   draw: (site) => `${site} tonen`,
   someCompared: (count, all) =>
     `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek om andere te kiezen.`,
-  notFetched: (reason) => `Dit kon niet worden opgehaald: ${reason}`,
+  notFetched: (reason) => `Dit kon niet worden geladen: ${reason}`,
   hours: (count) => `Afgelopen ${count} uur`,
   scans: 'Metingen',
   failed: 'Mislukte pogingen',
@@ -75,7 +75,7 @@ const DUTCH: In<typeof ENGLISH> = {
 };
 
 const SPANISH: In<typeof ENGLISH> = {
-  wasLive: 'último dato',
+  wasLive: 'últimos datos',
   acknowledged: (name, at) => `reconocida por ${name}, ${at}`,
   moreAlarms: (count) => `${count} más: vea las páginas de los invernaderos.`,
   deviation: 'Desviación',
@@ -84,7 +84,7 @@ const SPANISH: In<typeof ENGLISH> = {
   draw: (site) => `Mostrar ${site}`,
   someCompared: (count, all) =>
     `Se comparan ${count} de ${all} invernaderos, los peores primero. Busque para elegir otros.`,
-  notFetched: (reason) => `No se pudo obtener: ${reason}`,
+  notFetched: (reason) => `No se pudo cargar: ${reason}`,
   hours: (count) => `Últimas ${count} horas`,
   scans: 'Mediciones',
   failed: 'Intentos fallidos',

@@ -23,11 +23,11 @@ export const NOTES = {
   },
   de: {
     shared: (name: string): string =>
-      `Angemeldet als ${name}: Was Sie quittieren oder zurückstellen, sehen alle.`,
+      `Angemeldet als ${name}: Alle sehen, was hier quittiert oder zurückgestellt wird.`,
     reads: (name: string): string =>
-      `Angemeldet als ${name}, nur lesend: Sie sehen Alarme, können sie aber nicht quittieren oder zurückstellen.`,
+      `Angemeldet als ${name}, nur lesend: Alarme lassen sich ansehen, aber nicht quittieren oder zurückstellen.`,
     elsewhere: (name: string): string =>
-      `Angemeldet als ${name}: Dieser Server speichert keine Notizen. Alarme können Sie hier nicht quittieren oder zurückstellen.`,
+      `Angemeldet als ${name}: Dieser Server speichert keine Notizen; Alarme lassen sich hier nicht quittieren oder zurückstellen.`,
     acknowledged: (name: string, at: string): string => `quittiert von ${name}, ${at}`,
     failed: (why: string): string => `Nicht gespeichert: ${why}`,
     title: 'Kommentare',

@@ -219,7 +219,7 @@ test.each([
   lose();
   acknowledgeAlarms([COLD, other].map((each) => ({ alarm: each })));
   expect([own.get().acknowledged.size, lastAction.get()]).toEqual([0, null]);
-  expect(toast.get()).toBe('Not saved: The server is busy or unreachable.');
+  expect(toast.get()).toBe('Not saved: Server busy or unreachable');
   expect(requests).toEqual([]);
 });
 

@@ -66,7 +66,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     unshelve: (count) => `${counted(count, 'Alarm', 'Alarme')} wieder aktiviert`,
   },
   alarmsNew: (count) => `${count} neu`,
-  alarmsNewHint: 'Die Reihenfolge bleibt, solange Sie die Liste benutzen. Neue Alarme anzeigen',
+  alarmsNewHint: 'Die Reihenfolge bleibt, solange die Liste benutzt wird. Neue Alarme anzeigen',
   alarmFilter: 'Alarme filtern',
   alarmFilterHint: 'Filtern …',
   alarmOrder: 'Reihenfolge',
@@ -95,7 +95,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmSound: 'Ton',
   alarmSoundHints: {
     ready: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer in 10 s.',
-    waits: 'Der Browser erlaubt den Ton nach Ihrem ersten Klick auf dieser Seite.',
+    waits: 'Der Browser erlaubt den Ton nach dem ersten Klick auf dieser Seite.',
     none: 'Dieser Browser kann keinen Ton abspielen.',
   },
   alarmNotify: 'Benachrichtigung',
@@ -191,7 +191,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',
-  healthDriver: (tag, reason) => `Messpunkt ${tag}: ${reason}`,
   healthMostUnknown: 'Von mehr als der Hälfte der Messpunkte ist nichts bekannt',
   healthSomeUnknown: (count) =>
     `${counted(count, 'Messpunkt lässt', 'Messpunkte lassen')} sich nicht beurteilen`,

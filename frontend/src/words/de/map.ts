@@ -56,7 +56,7 @@ export const MAP: In<typeof EN.MAP> = {
   readoutOld: 'Messwerte zu alt',
   heat: 'Heatmap zeigt',
   heats: { nearest: 'Nächstgelegene Messwerte', estimate: 'Schätzung', error: 'Unsicherheit' },
-  partMissing: 'Dieser Teil der Seite konnte nicht geladen werden. Laden Sie die Seite neu.',
+  partMissing: 'Dieser Teil der Seite konnte nicht geladen werden. Bitte die Seite neu laden.',
   colouring: 'Farben nach',
   colourings: { ideal: 'Ideal', value: 'Wert' },
   legendNoIdeal: 'Zurzeit kein Idealbereich: Farben nach dem Wert',
@@ -119,7 +119,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   },
   pest: 'Schädling',
   pestCount: (count) => counted(count, 'Schädling', 'Schädlinge'),
-  notOnMap: 'Ohne Ort',
+  notOnMap: 'Ohne Position',
   notOnMapLong: 'Die Position ist noch nicht bekannt; der Messpunkt fehlt auf der Karte.',
   farOff: 'Zu weit entfernt, nicht auf der Karte',
   farOffLong: (place) =>
@@ -135,7 +135,7 @@ export const TAGS: In<typeof EN.TAGS> = {
     unreachable: 'nicht erreichbar',
     undecoded: 'nicht lesbar',
     skipped: 'übersprungen',
-    failed: 'fehlgeschlagen',
+    failed: 'Grund unbekannt',
   },
   noValue: '–',
   sensorFailed: 'ausgefallen',
@@ -194,8 +194,8 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartEmpty: 'Kein Messwert in diesem Zeitraum.',
   chartNeedsDay: (known) =>
     known === null
-      ? 'Braucht 24 h Messwerte ohne Lücke von über 3 h'
-      : `Braucht 24 h Messwerte; bisher ${known}`,
+      ? 'Braucht Messwerte aus 24 h, ohne Lücke von über 3 h'
+      : `Braucht Messwerte aus 24 h; bisher ${known}`,
   chartLoading: 'Frühere Daten werden geladen',
   chartFailed: (reason) =>
     `Frühere Daten konnten nicht geladen werden (${reason}); die Seite versucht es weiter.`,

@@ -44,9 +44,9 @@ export const PAGE: In<typeof EN.PAGE> = {
   },
   offlineWhy: {
     no_clock:
-      'Von dort kommt die Zeit des Zwillings; noch fehlt sie. Das Alter der Werte ist unbekannt.',
+      'Von dort bekommt der Zwilling seine Zeit; noch fehlt sie. Das Alter der Werte ist unbekannt.',
     clock_stopped:
-      'Von dort kommt die Zeit des Zwillings; sie steht still. Das Alter der Werte ist unbekannt.',
+      'Von dort bekommt der Zwilling seine Zeit; sie steht still. Das Alter der Werte ist unbekannt.',
     clock_doubted:
       'Sie geht gegenüber der Aufzeichnung nach. Bis sie stimmt, höchstens zehn Minuten lang, ist das Alter der Werte unbekannt, und die Aufzeichnung wartet.',
     clock_ahead: 'Sie geht gegenüber dem Archiv vor; das Alter der Werte ist unbekannt.',
@@ -54,7 +54,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       'Der Server hat noch keine Daten von einem Zwilling. Ist der Zwilling eingeschaltet?',
     stale: 'Der Zwilling sendet nicht mehr. Bitte prüfen, ob er läuft.',
     thread_dead: 'Der Server hat den Kontakt zum Zwilling verloren und muss neu gestartet werden.',
-    shutting_down: 'Der Server wird gerade beendet.',
+    shutting_down: 'Der Server wird heruntergefahren.',
   },
   offlineMore: {
     no_clock: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts.',
@@ -64,7 +64,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
   },
 
-  serverBusy: 'Der Server kann gerade nicht antworten.',
+  serverBusy: 'Server überlastet oder nicht erreichbar',
   unread: (count) =>
     count === 1
       ? 'Eine Nachricht vom Server war nicht lesbar und wurde verworfen.'
@@ -95,11 +95,11 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     in_use: {
       title: 'Dieser Zwilling zeichnet nicht auf: Ein anderer nutzt seine Datei.',
-      hint: 'Einen der beiden beenden oder diesem eine eigene Datei geben.',
+      hint: 'Bitte einen der beiden beenden oder diesem eine eigene Datei geben.',
     },
     foreign: {
       title: 'Dieser Zwilling zeichnet nicht auf: Er kann seine Datei nicht lesen.',
-      hint: 'Darin wurde nichts verändert. Dem Zwilling eine andere Datei geben oder diese verschieben.',
+      hint: 'Darin wurde nichts verändert. Bitte dem Zwilling eine andere Datei geben oder diese verschieben.',
     },
   },
   notificationChannels: {
@@ -128,7 +128,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
   failedTitle: 'Diese Seite ist abgestürzt',
   failedHint:
-    'Verlassen Sie sich nicht auf ihre Anzeige. Zwilling und Server sind nicht betroffen. Die Seite lädt sich von selbst neu.',
+    'Bitte nicht auf die Anzeige verlassen. Zwilling und Server sind nicht betroffen. Die Seite lädt sich von selbst neu.',
   reload: 'Neu laden',
 
   menu: 'Menü',
@@ -146,7 +146,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `cycle=${asked} wird ignoriert: möglich sind ${least} bis ${most} Sekunden.`,
   help: 'Tastenkürzel',
   signOut: 'Abmelden',
-  signOutFailed: (reason) => `Sie sind noch angemeldet: ${reason}`,
+  signOutFailed: (reason) => `Abmelden fehlgeschlagen: ${reason}`,
   exportFailed: (reason) => `Es wurde nichts gespeichert: ${reason}`,
 
   emptyConnecting: 'Verbindung zum Server wird aufgebaut',
@@ -158,15 +158,14 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyNoTwin: 'Noch keine Daten',
   emptyNoTags: 'Noch keine Messpunkte',
   emptyNoTagsHint:
-    'Messpunkte erscheinen, sobald der Roboter sie findet oder misst: ' +
-    'Schicken Sie ihn auf seine Runde.',
+    'Messpunkte erscheinen, sobald der Roboter sie findet oder misst: Bitte seine Runde starten.',
   emptyNoTagsMore: '„lupin-twin demo“ zeigt eine simulierte Runde.',
   emptyNoPins: 'Noch kein Messpunkt hat eine Position',
   emptyNoPinsHint:
     'Alle Messpunkte stehen in der Tabelle; mit der ersten guten Messung kommen sie auf die Karte.',
   emptyNoReading: (sensor) => `Noch keine Messwerte auf der Karte: ${sensor}`,
   emptyNoReadingHint:
-    'Wählen Sie einen anderen Sensor, oder warten Sie, bis der Roboter weitere gemessen hat.',
+    'Bitte einen anderen Sensor wählen oder warten, bis der Roboter mehr gemessen hat.',
   emptyNoMap: 'Noch kein Grundriss',
   emptyNoMapMore: 'Der Roboter hat seine SLAM-Karte, die auf /map kommt, noch nicht geschickt.',
 
@@ -250,7 +249,7 @@ export const PAST: In<typeof EN.PAST> = {
     scans: 'Balken nach oben: Messungen',
     failures: 'Balken nach unten: fehlgeschlagene Versuche',
     pest: 'gefülltes Dreieck: Schädlinge gefunden',
-    cleared: 'leerer Ring: Schädlinge weg',
+    cleared: 'leerer Ring: wieder befallsfrei',
     silence: 'schraffiert: kein Messversuch',
     before: 'gegenläufig schraffiert: nicht aufgezeichnet oder nicht mehr gespeichert',
     run: 'gestrichelte Linie: Uhr zurückgesetzt',
@@ -260,6 +259,6 @@ export const PAST: In<typeof EN.PAST> = {
       counted(scans, 'Messung', 'Messungen'),
       ...(failures > 0 ? [`${failures} fehlgeschlagen`] : []),
       ...(seen > 0 ? [counted(seen, 'Schädlingsfund', 'Schädlingsfunde')] : []),
-      ...(cleared > 0 ? [counted(cleared, 'Schädling weg', 'Schädlinge weg')] : []),
+      ...(cleared > 0 ? [`${cleared} wieder befallsfrei`] : []),
     ].join(', '),
 };

@@ -102,7 +102,7 @@ export const ALARMS = {
   alarmNotify: 'Notification',
   alarmNotifyHint:
     'The browser notifies you of new alarms while this page is open in the background.',
-  alarmNotifyPushed: 'Critical alarms also come while it is closed.',
+  alarmNotifyPushed: 'Critical alarms also arrive while it is closed.',
   alarmNotifyNot: {
     insecure: 'Browsers allow this only on addresses that begin with https:// or http://localhost.',
     refused: 'This browser blocks notifications. Allow them for this page in its settings.',
@@ -198,7 +198,6 @@ export const HEALTH = {
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',
-  healthDriver: (tag: string, reason: string): string => `Tag ${tag}: ${reason}`,
   healthMostUnknown: 'More than half of the tags are unknown',
   healthSomeUnknown: (count: number): string =>
     `${counted(count, 'tag', 'tags')} cannot be assessed`,

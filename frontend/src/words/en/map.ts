@@ -51,7 +51,7 @@ export const MAP = {
   heat: 'Heat map shows',
   heats: { nearest: 'Nearest readings', estimate: 'Estimate', error: 'Uncertainty' },
   partMissing: 'This part of the page could not be loaded. Reload the page.',
-  colouring: 'Colours by',
+  colouring: 'Colour by',
   colourings: { ideal: 'Ideal', value: 'Value' },
   legendNoIdeal: 'No ideal range for now: coloured by value',
   /** Short sensor name for the sensor picker and table headings; a site's own name stays as it is. */
@@ -131,7 +131,7 @@ export const TAGS = {
     unreachable: 'not reachable',
     undecoded: 'not readable',
     skipped: 'skipped',
-    failed: 'failed',
+    failed: 'reason unknown',
   },
   noValue: '–',
   sensorFailed: 'failed',
@@ -200,7 +200,7 @@ export const CHARTS = {
   /** For a daily quantity. `known`: how far back data reaches; null: a day, but with a gap. */
   chartNeedsDay: (known: string | null): string =>
     known === null
-      ? 'Needs 24 h of readings without a gap of over 3 h'
+      ? 'Needs 24 h of readings without a gap longer than 3 h'
       : `Needs 24 h of readings; ${known} so far`,
   chartLoading: 'Loading history',
   chartFailed: (reason: string): string =>

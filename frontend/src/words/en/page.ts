@@ -45,11 +45,11 @@ export const PAGE = {
   },
   offlineWhy: {
     no_clock:
-      'The twin’s time comes from there, and there is none yet. The age of the readings is unknown.',
+      'The twin takes its time from it and has none yet. The age of the readings is unknown.',
     clock_stopped:
-      'The twin’s time comes from there, and it has stopped. The age of the readings is unknown.',
+      'The twin takes its time from it, and that has stopped. The age of the readings is unknown.',
     clock_doubted:
-      'It is behind the recorded data. Until it is right, or for ten minutes, ages are unknown and recording waits.',
+      'It is behind the recorded data. Until it is right, for at most ten minutes, ages are unknown and recording waits.',
     clock_ahead: 'It is ahead of the archive’s clock, so ages are unknown.',
     never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
     stale: 'The twin has stopped sending. Check that it is running.',
@@ -66,7 +66,7 @@ export const PAGE = {
   },
 
   /** Replaces the server's error if it may recover soon. */
-  serverBusy: 'The server is busy or unreachable.',
+  serverBusy: 'Server busy or unreachable',
   unread: (count: number): string =>
     count === 1
       ? 'A message from the server could not be read and was dropped.'
@@ -74,17 +74,17 @@ export const PAGE = {
   paused: 'Time is paused.',
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
   mixture: 'More than one twin sends data. The page shows a mixture of them: stop all but one.',
-  inputProblem: 'Some data is not received.',
+  inputProblem: 'Some data does not arrive.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last few minutes.`,
   /** For a journal that does not record: the problem, and what to do. */
   journal: {
     off: {
       title: 'Recording is off.',
-      hint: 'After a restart, all earlier data is lost.',
+      hint: 'A restart loses all earlier data.',
     },
     slow: {
-      title: 'Recording is behind.',
+      title: 'Recording has fallen behind.',
       hint: 'Data waits in memory until the disk catches up. A power cut would lose it.',
     },
     failing: {

@@ -192,12 +192,11 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     other: 'Comprobar in situ',
   },
   todoPestAgain: 'Revisar otra vez',
-  todoWell: 'Esperar otra medición buena',
-  todoAlso: (tags) => (tags === 1 ? 'también punto' : 'también puntos'),
+  todoWell: 'Esperar otra medición correcta',
+  todoAlso: (tags) => (tags === 1 ? 'también el punto' : 'también los puntos'),
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',
-  healthDriver: (tag, reason) => `Punto ${tag}: ${reason}`,
   healthMostUnknown: 'Se desconoce el estado de más de la mitad de los puntos',
   healthSomeUnknown: (count) =>
     `No se ${count === 1 ? 'puede' : 'pueden'} evaluar ${counted(count, 'punto', 'puntos')}`,
@@ -211,8 +210,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === '1'
-      ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición o revisión buena'
-      : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición o revisión buena`,
+      ? 'Aún hay 1 alarma activa: quedará resuelta con la próxima medición o revisión correcta'
+      : `Aún hay ${alarms} alarmas activas: quedarán resueltas con la próxima medición o revisión correcta`,
   healthAcknowledged: 'reconocida',
   healthNotCurrent: 'Desactualizado',
   healthNoTime: 'Sin evaluar mientras se desconozca la hora',

@@ -133,7 +133,7 @@ export const TAGS: In<typeof EN.TAGS> = {
     unreachable: 'inaccesible',
     undecoded: 'ilegible',
     skipped: 'omitido',
-    failed: 'fallido',
+    failed: 'motivo desconocido',
   },
   noValue: '–',
   sensorFailed: 'averiado',

@@ -20,7 +20,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     connecting: 'Conectando',
     live: 'En directo',
     stale: 'Sin señal',
-    offline: 'Sin gemelo',
+    offline: 'Gemelo inactivo',
     noTime: 'Hora desconocida',
     reconnecting: 'Reconectando',
   },
@@ -46,8 +46,9 @@ export const PAGE: In<typeof EN.PAGE> = {
     clock_stopped:
       'El gemelo toma de ella la hora, que se ha parado. Se desconoce la antigüedad de las lecturas.',
     clock_doubted:
-      'Va atrasado respecto a los datos registrados. Hasta que esté en hora, o durante diez minutos, se desconoce la antigüedad de las lecturas y el registro espera.',
-    clock_ahead: 'Va adelantado respecto al archivo; se desconoce la antigüedad de las lecturas.',
+      'Va atrasado respecto a los datos registrados. Hasta que esté en hora, como mucho diez minutos, se desconoce la antigüedad de las lecturas y el registro espera.',
+    clock_ahead:
+      'Va adelantado respecto al archivo central; se desconoce la antigüedad de las lecturas.',
     never_seen: 'El servidor aún no ha recibido nada de un gemelo. ¿Está encendido el gemelo?',
     stale: 'El gemelo ha dejado de enviar. Compruebe que está en marcha.',
     thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
@@ -62,7 +63,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     thread_dead: 'El hilo de ROS del puente («bridge») ha terminado; su registro dice por qué.',
   },
 
-  serverBusy: 'El servidor no puede responder ahora.',
+  serverBusy: 'Servidor sobrecargado o inaccesible',
   unread: (count) =>
     count === 1
       ? 'Un mensaje del servidor no se pudo leer y se descartó.'
@@ -154,12 +155,11 @@ export const PAGE: In<typeof EN.PAGE> = {
     'El servidor es el puente («bridge»): «lupin-twin serve» en el robot, o «make run» para la demostración.',
   emptyNoTwin: 'Aún no hay datos',
   emptyNoTags: 'Aún no hay puntos de medida',
-  emptyNoTagsHint:
-    'Los puntos aparecen cuando el robot los encuentra o los mide: ' + 'mándelo a hacer su ronda.',
+  emptyNoTagsHint: 'Los puntos aparecen cuando el robot los encuentra o los mide: inicie su ronda.',
   emptyNoTagsMore: '«lupin-twin demo» muestra una ronda simulada.',
   emptyNoPins: 'Ningún punto tiene posición todavía',
   emptyNoPinsHint:
-    'Todos los puntos están en la tabla; con la primera medición buena aparecen en el mapa.',
+    'Todos los puntos están en la tabla; con la primera medición correcta aparecen en el mapa.',
   emptyNoReading: (sensor) => `Aún no hay lecturas en el mapa: ${sensor}`,
   emptyNoReadingHint: 'Elija otro sensor o espere a que el robot mida más puntos.',
   emptyNoMap: 'Aún no hay plano',
@@ -210,7 +210,7 @@ export const PAST: In<typeof EN.PAST> = {
   pastFetching: (moment) => `Cargando ${moment}`,
   pastFetchingHint: 'No se muestra nada hasta que se cargue.',
   pastFailed: (moment) => `No se puede mostrar ${moment}`,
-  pastFuture: 'Ese momento aún no ha llegado.',
+  pastFuture: 'Ese momento está en el futuro.',
   pastNothing: (moment) => `Sin datos de ${moment}`,
   pastReach: (from) => `Hay datos registrados desde ${from}.`,
   pastReachNothing: 'Aún no hay nada registrado.',
@@ -245,7 +245,7 @@ export const PAST: In<typeof EN.PAST> = {
     scans: 'barra hacia arriba: mediciones',
     failures: 'barra hacia abajo: intentos fallidos',
     pest: 'triángulo lleno: plaga detectada',
-    cleared: 'anillo vacío: plaga desaparecida',
+    cleared: 'anillo vacío: de nuevo sin plaga',
     silence: 'rayado: no se intentó medir',
     before: 'rayado inverso: sin registro, o ya no se conserva',
     run: 'línea discontinua: el reloj volvió atrás',
@@ -255,6 +255,6 @@ export const PAST: In<typeof EN.PAST> = {
       counted(scans, 'medición', 'mediciones'),
       ...(failures > 0 ? [counted(failures, 'fallida', 'fallidas')] : []),
       ...(seen > 0 ? [counted(seen, 'plaga detectada', 'plagas detectadas')] : []),
-      ...(cleared > 0 ? [counted(cleared, 'plaga desaparecida', 'plagas desaparecidas')] : []),
+      ...(cleared > 0 ? [`${cleared} de nuevo sin plaga`] : []),
     ].join(', '),
 };

@@ -37,7 +37,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Naar het begin',
   alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
-  alarmAll: (what, count) => `Alles ${what.toLowerCase()} (${count})`,
+  alarmAll: (what, count) => `Alle ${what.toLowerCase()} (${count})`,
   alarmUnacknowledge: 'Bevestiging intrekken',
   alarmShelve: 'Uitstellen',
   alarmShelveHint: 'Tot dan geen melding, tenzij het erger wordt.',
@@ -160,10 +160,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   airCause: { damp: 'Lucht te vochtig', dry: 'Lucht te droog' },
   todo: {
     sensors: {
-      temperature: { below: 'Stoken of luchting sluiten', above: 'Luchten of schermen' },
+      temperature: { below: 'Stoken of luchtramen sluiten', above: 'Luchten of schermen' },
       co2: { below: 'CO₂ doseren of luchten', above: 'Luchten, CO₂-dosering controleren' },
       light: { below: 'Belichting aanzetten', above: 'Schermen' },
-      soil_moisture: { below: 'Water geven', above: 'Minder water, drain controleren' },
+      soil_moisture: { below: 'Water geven', above: 'Minder water geven, drain controleren' },
     },
     air: { damp: 'Luchten en stoken', dry: 'Bevochtigen of schermen' },
     range: 'Klimaatregeling controleren',
@@ -183,7 +183,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',
-  healthDriver: (tag, reason) => `Meetpunt ${tag}: ${reason}`,
   healthMostUnknown: 'Van meer dan de helft van de meetpunten is niets bekend',
   healthSomeUnknown: (count) =>
     `${counted(count, 'meetpunt is', 'meetpunten zijn')} niet te beoordelen`,

@@ -22,7 +22,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     stale: 'Geen signaal',
     offline: 'Twin offline',
     noTime: 'Tijd onbekend',
-    reconnecting: 'Verbindt opnieuw',
+    reconnecting: 'Opnieuw verbinden',
   },
   phaseLabel: 'Verbinding',
   retryNow: 'Nu proberen',
@@ -42,9 +42,9 @@ export const PAGE: In<typeof EN.PAGE> = {
   },
   offlineWhy: {
     no_clock:
-      'Daar haalt de digital twin zijn tijd vandaan; die is er nog niet. Hoe oud de meetwaarden zijn, is onbekend.',
+      'Daar haalt de digital twin zijn tijd vandaan, maar die is er nog niet. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_stopped:
-      'Daar haalt de digital twin zijn tijd vandaan; die staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
+      'Daar haalt de digital twin zijn tijd vandaan, maar die staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_doubted:
       'Die loopt achter op de vastgelegde gegevens. Tot de klok goed staat, hooguit tien minuten, is onbekend hoe oud de meetwaarden zijn en wacht het vastleggen.',
     clock_ahead: 'Die loopt voor op het archief; hoe oud de meetwaarden zijn, is onbekend.',
@@ -64,7 +64,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
   },
 
-  serverBusy: 'De server kan nu even niet antwoorden.',
+  serverBusy: 'Server overbelast of niet bereikbaar',
   unread: (count) =>
     count === 1
       ? 'Een bericht van de server was onleesbaar en is genegeerd.'
@@ -124,7 +124,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   simulatedHint: (until) => `Alle gegevens tot ${until} zijn demogegevens, niet gemeten.`,
   quarantined: 'Een beschadigd bestand is in quarantaine gezet.',
   quarantinedHint: (name) =>
-    `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het bestand heet ${name}.`,
+    `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
   failedHint:
     'Vertrouw niet op wat u hier ziet. De digital twin en de server hebben er geen last van. De pagina laadt vanzelf opnieuw.',
@@ -156,8 +156,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     'De server is de bridge: “lupin-twin serve” op de robot, of “make run” voor de demo.',
   emptyNoTwin: 'Nog geen gegevens',
   emptyNoTags: 'Nog geen meetpunten',
-  emptyNoTagsHint:
-    'Meetpunten verschijnen zodra de robot ze vindt of meet: ' + 'stuur hem op zijn ronde.',
+  emptyNoTagsHint: 'Meetpunten verschijnen zodra de robot ze vindt of meet: start zijn ronde.',
   emptyNoTagsMore: '“lupin-twin demo” toont een gesimuleerde ronde.',
   emptyNoPins: 'Nog geen meetpunt heeft een positie',
   emptyNoPinsHint:
@@ -247,7 +246,7 @@ export const PAST: In<typeof EN.PAST> = {
     scans: 'balk omhoog: metingen',
     failures: 'balk omlaag: mislukte pogingen',
     pest: 'gevulde driehoek: plaag gezien',
-    cleared: 'lege ring: plaag weg',
+    cleared: 'lege ring: weer plaagvrij',
     silence: 'gearceerd: geen meetpoging',
     before: 'andersom gearceerd: niet vastgelegd of niet meer bewaard',
     run: 'streepjeslijn: klok teruggezet',
@@ -257,6 +256,6 @@ export const PAST: In<typeof EN.PAST> = {
       counted(scans, 'meting', 'metingen'),
       ...(failures > 0 ? [`${failures} mislukt`] : []),
       ...(seen > 0 ? [counted(seen, 'plaag gezien', 'plagen gezien')] : []),
-      ...(cleared > 0 ? [counted(cleared, 'plaag weg', 'plagen weg')] : []),
+      ...(cleared > 0 ? [`${cleared} weer plaagvrij`] : []),
     ].join(', '),
 };

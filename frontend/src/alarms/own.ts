@@ -267,9 +267,7 @@ export const updateNotifySettings = (way: Partial<Pick<LocalAlarms, 'sound' | 'n
 /** Loads the stored state, and stores every change; returns a stop function. */
 export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
   own.set(readStored(storage));
-  const stop = own.subscribe(() => {
-    writeStored(storage, own.get());
-  });
+  const stop = own.subscribe(() => writeStored(storage, own.get()));
   // Another tab changed the state: undoing here would undo its change too.
   const onStorage = ({ key }: StorageEvent): void => {
     if (key !== KEY && key !== null) return;

@@ -63,9 +63,7 @@ export function startAlarms(): () => void {
       for (const listener of [...listeners]) listener(news);
     }
   };
-  const onAlarms = (): void => {
-    update(false);
-  };
+  const onAlarms = (): void => update(false);
   const onOwn = (): void => {
     if (checked !== own.get()) update(true);
   };

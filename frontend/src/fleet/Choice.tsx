@@ -13,14 +13,7 @@ interface Props<Option extends string | number> {
 export function Choice<Option extends string | number>(props: Props<Option>): JSX.Element {
   const { label, options, value, onChange, text, count = () => null } = props;
   const buttons = options.map((each) => (
-    <button
-      key={each}
-      type="button"
-      aria-pressed={each === value}
-      onClick={() => {
-        onChange(each);
-      }}
-    >
+    <button key={each} type="button" aria-pressed={each === value} onClick={() => onChange(each)}>
       {text(each)}
       {count(each) !== null && (
         <>

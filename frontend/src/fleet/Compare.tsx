@@ -112,9 +112,7 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
                         aria-label={W.draw(site.name)}
                         checked={drawn.includes(site.site)}
                         disabled={!drawn.includes(site.site) && drawn.length >= MOST_DRAWN}
-                        onChange={() => {
-                          toggle(site.site);
-                        }}
+                        onChange={() => toggle(site.site)}
                       />
                       <Look place={drawn.indexOf(site.site)} />
                     </label>
@@ -161,9 +159,7 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite): string {
 function onSystemTheme(listener: () => void): () => void {
   const system = window.matchMedia('(prefers-color-scheme: dark)');
   system.addEventListener('change', listener);
-  return () => {
-    system.removeEventListener('change', listener);
-  };
+  return () => system.removeEventListener('change', listener);
 }
 
 function Chart({

@@ -55,9 +55,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
   const [causeText, setCauseText] = useState<CauseText | null>(null);
-  const onWords = useCallback((text: CauseText) => {
-    setCauseText(() => text);
-  }, []);
+  const onWords = useCallback((text: CauseText) => setCauseText(() => text), []);
   const field = useRef<HTMLInputElement>(null);
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
@@ -83,9 +81,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
       field.current?.focus();
     };
     document.addEventListener('keydown', onKey);
-    return () => {
-      document.removeEventListener('keydown', onKey);
-    };
+    return () => document.removeEventListener('keydown', onKey);
   }, []);
 
   return (
@@ -114,9 +110,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
               aria-keyshortcuts="/"
               placeholder={words.search}
               value={search}
-              onChange={(event) => {
-                setSearch(event.target.value);
-              }}
+              onChange={(event) => setSearch(event.target.value)}
             />
             <Choice
               label={words.filter}

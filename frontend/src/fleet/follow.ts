@@ -42,9 +42,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   };
   const wait = (): void => {
     clearTimeout(timer);
-    timer = setTimeout(() => {
-      lost(null);
-    }, SILENT_MS);
+    timer = setTimeout(() => lost(null), SILENT_MS);
   };
   const open = (): void => {
     drop();
@@ -75,9 +73,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     if (document.visibilityState === 'visible' && (seen.lostAt !== null || !socket)) open();
   };
   // After sleep, the socket may be dead.
-  const stopLapse = onLapse(() => {
-    setTimeout(open);
-  });
+  const stopLapse = onLapse(() => setTimeout(open));
   document.addEventListener('visibilitychange', again);
   window.addEventListener('online', again);
   onSeen(seen);

@@ -15,9 +15,7 @@ export function MapView({ kiosk }: { kiosk: boolean }): JSX.Element {
   useEffect(() => {
     if (!element.current || !still.current || !pins.current || !overlay.current) return undefined;
     const canvases = { still: still.current, pins: pins.current, overlay: overlay.current };
-    const onFailure = (error: unknown): void => {
-      setFailure({ error });
-    };
+    const onFailure = (error: unknown): void => setFailure({ error });
     return runMap(element.current, canvases, kiosk, onFailure);
   }, [kiosk]);
   return (

@@ -222,7 +222,5 @@ export function watchCovered(element: HTMLElement, onChange: () => void): () => 
   for (const each of element.parentElement?.querySelectorAll('.map-controls, .map-foot') ?? []) {
     observer.observe(each);
   }
-  return () => {
-    observer.disconnect();
-  };
+  return () => observer.disconnect();
 }

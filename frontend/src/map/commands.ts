@@ -26,19 +26,13 @@ export function keyAction({ key, shiftKey }: KeyboardEvent): ((map: MapActions) 
   const [arrow, factor] = [ARROWS[key], ZOOMS[key]];
   if (arrow) {
     const far = shiftKey ? 0.5 : 0.1;
-    return (map) => {
-      map.panBy(far * arrow[0], far * arrow[1]);
-    };
+    return (map) => map.panBy(far * arrow[0], far * arrow[1]);
   }
   if (factor !== undefined) {
-    return (map) => {
-      map.zoomBy(factor);
-    };
+    return (map) => map.zoomBy(factor);
   }
   if (key !== '0' && key !== 'Home') return null;
-  return (map) => {
-    map.fit();
-  };
+  return (map) => map.fit();
 }
 
 /**

@@ -150,9 +150,7 @@ export function runMap(
     const { selected } = view;
     if (selected !== null && selected !== before.view.selected) {
       // After the card is laid out, which covers part of the map on a phone.
-      requestAnimationFrame(() => {
-        show(selected);
-      });
+      requestAnimationFrame(() => show(selected));
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
     if (view.camera !== before.view.camera || !sameContent) goToContent();
@@ -224,12 +222,8 @@ export function runMap(
   const aim = (): void => {
     if (!crosshair) setCrosshair(true);
   };
-  const onFocus = (): void => {
-    setCrosshair(element.matches(':focus-visible'));
-  };
-  const onBlur = (): void => {
-    setCrosshair(false);
-  };
+  const onFocus = (): void => setCrosshair(element.matches(':focus-visible'));
+  const onBlur = (): void => setCrosshair(false);
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
     if (event.key === 'Enter' || event.key === ' ') {
@@ -255,12 +249,8 @@ export function runMap(
       act({ camera: null });
       goToContent();
     },
-    zoomBy: (factor) => {
-      camera.zoomBy(factor);
-    },
-    panBy: (x, y) => {
-      camera.panBy(x, y);
-    },
+    zoomBy: (factor) => camera.zoomBy(factor),
+    panBy: (x, y) => camera.panBy(x, y),
   };
   theMap.set(actions);
 
@@ -323,9 +313,7 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
-    marksOnMap.subscribe(() => {
-      spoil('pins');
-    }),
+    marksOnMap.subscribe(() => spoil('pins')),
     onThemeChange(() => {
       painter.recolour();
       spoil('still', 'pins', 'overlay');

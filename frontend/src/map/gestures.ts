@@ -43,9 +43,7 @@ function takeHold(element: HTMLElement, held: Held): Hand {
     .on('start', byHand(held.onStart))
     .on(
       'zoom',
-      byHand(({ transform }) => {
-        moveViewport({ view: toView(transform) });
-      }),
+      byHand(({ transform }) => moveViewport({ view: toView(transform) })),
     )
     .on('end', byHand(held.onEnd));
   return {
@@ -54,6 +52,4 @@ function takeHold(element: HTMLElement, held: Held): Hand {
   };
 }
 
-export const startGestures = (): void => {
-  gestures.set(takeHold);
-};
+export const startGestures = (): void => gestures.set(takeHold);

@@ -101,9 +101,7 @@ const roomy = window.matchMedia('(min-width: 64em) and (min-height: 43em)');
 
 function onRoom(listener: () => void): () => void {
   roomy.addEventListener('change', listener);
-  return () => {
-    roomy.removeEventListener('change', listener);
-  };
+  return () => roomy.removeEventListener('change', listener);
 }
 
 const NO_CYCLE: CycleSetting = { seconds: null, refused: null };
@@ -124,9 +122,7 @@ function PaneTabs(): JSX.Element {
     <button
       type="button"
       aria-pressed={shown === name}
-      onClick={() => {
-        act(name === 'map' ? { pane: 'map', chartedFrom: null } : withList(name));
-      }}
+      onClick={() => act(name === 'map' ? { pane: 'map', chartedFrom: null } : withList(name))}
     >
       <Icon name={name === 'map' ? 'map' : name === 'tags' ? 'list' : 'bell'} />
       <span>{label}</span>

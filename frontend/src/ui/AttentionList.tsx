@@ -170,7 +170,5 @@ export function startKioskClose(): () => void {
     if (event.key === 'Escape' && !event.defaultPrevented) closeKiosk();
   };
   document.addEventListener('keydown', onKeyDown);
-  return () => {
-    document.removeEventListener('keydown', onKeyDown);
-  };
+  return () => document.removeEventListener('keydown', onKeyDown);
 }

@@ -21,9 +21,7 @@ export function CompareControl(): JSX.Element {
         data-testid="compare"
         options={CHOICES}
         text={(choice) => S.compareWith[choice]}
-        onChange={(choice) => {
-          act({ compare: choice === 'none' ? null : choice });
-        }}
+        onChange={(choice) => act({ compare: choice === 'none' ? null : choice })}
       />
     </label>
   );

@@ -144,24 +144,12 @@ export function DoNow({
       {isOfTags ? (
         lines.map(([task, ...others], index) => (
           <li key={index}>
-            <button
-              type="button"
-              data-tag-id={task.tagId}
-              onClick={() => {
-                act(withTag(task.tagId));
-              }}
-            >
+            <button type="button" data-tag-id={task.tagId} onClick={() => act(withTag(task.tagId))}>
               <HealthMark verdict={task.reasons[0].verdict} word={false} />
               <Todo task={task} also={hasAlso ? others : []} id={index === 0 ? id : undefined} />
             </button>
             {index === lines.length - 1 && rest > 0 && (
-              <button
-                type="button"
-                className="do-more"
-                onClick={() => {
-                  act(withList('tags'));
-                }}
-              >
+              <button type="button" className="do-more" onClick={() => act(withList('tags'))}>
                 {S.attentionMore(rest)}
               </button>
             )}
@@ -285,9 +273,7 @@ export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.
       type="button"
       className="shelved-count"
       disabled={disabled}
-      onClick={() => {
-        act(withList('alarms'));
-      }}
+      onClick={() => act(withList('alarms'))}
     >
       {S.alarmGroups.shelved(String(count))}
     </button>

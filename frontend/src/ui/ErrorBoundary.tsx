@@ -21,9 +21,7 @@ export class ErrorBoundary extends Component<{
 
   override componentDidCatch(): void {
     if (!this.props.isPart) return;
-    this.#timer = setTimeout(() => {
-      this.setState({ why: null });
-    }, AGAIN_MS);
+    this.#timer = setTimeout(() => this.setState({ why: null }), AGAIN_MS);
   }
 
   override componentWillUnmount(): void {

@@ -46,9 +46,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               disabled={kiosk}
               data-health={verdict}
               data-none={health.counts[verdict] === 0}
-              onClick={() => {
-                act({ health: filter === verdict ? null : verdict, list: 'tags' });
-              }}
+              onClick={() => act({ health: filter === verdict ? null : verdict, list: 'tags' })}
             >
               <HealthShape verdict={verdict} />
               <strong>

@@ -30,9 +30,7 @@ export function HelpDialog(): JSX.Element {
       if (event.target === element) element?.close();
     };
     element?.addEventListener('click', onClick);
-    return () => {
-      element?.removeEventListener('click', onClick);
-    };
+    return () => element?.removeEventListener('click', onClick);
   }, []);
   return (
     <dialog id={ID} className="help" ref={dialog} aria-labelledby="help-title">
@@ -51,9 +49,7 @@ export function HelpDialog(): JSX.Element {
         <Check
           label={S.helpToggle}
           isOn={shortcuts}
-          onChange={(isOn) => {
-            prefer({ shortcuts: isOn });
-          }}
+          onChange={(isOn) => prefer({ shortcuts: isOn })}
         />
       </div>
     </dialog>

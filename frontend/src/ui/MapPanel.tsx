@@ -61,15 +61,9 @@ function MapControls(): JSX.Element {
   return (
     <div className="map-controls" data-over-map>
       <div className="stack">
-        {button(S.zoomIn, 'plus', () => {
-          theMap.get()?.zoomBy(1.5);
-        })}
-        {button(S.zoomOut, 'minus', () => {
-          theMap.get()?.zoomBy(1 / 1.5);
-        })}
-        {button(S.fit, 'fit', () => {
-          theMap.get()?.fit();
-        })}
+        {button(S.zoomIn, 'plus', () => theMap.get()?.zoomBy(1.5))}
+        {button(S.zoomOut, 'minus', () => theMap.get()?.zoomBy(1 / 1.5))}
+        {button(S.fit, 'fit', () => theMap.get()?.fit())}
       </div>
       <Disclosure label={S.layersButton} button={<Icon name="layers" />} className="layers">
         <LayerList />
@@ -91,9 +85,7 @@ function LayerList(): JSX.Element {
             key={layer}
             label={S.layers[layer]}
             isOn={on.has(layer)}
-            onChange={(isOn) => {
-              act(withLayer(layer, isOn));
-            }}
+            onChange={(isOn) => act(withLayer(layer, isOn))}
           />
         ))}
         <WithParts>{(parts) => <parts.InLayers />}</WithParts>

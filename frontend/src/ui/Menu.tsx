@@ -41,9 +41,7 @@ export function Menu(): JSX.Element {
           { value: 'light', label: S.themes.light },
           { value: 'dark', label: S.themes.dark },
         ]}
-        onChange={(value) => {
-          prefer({ theme: value });
-        }}
+        onChange={(value) => prefer({ theme: value })}
       />
       <Segmented<TemperatureUnit>
         legend={S.unit}
@@ -52,17 +50,13 @@ export function Menu(): JSX.Element {
           { value: 'C', label: '°C' },
           { value: 'F', label: '°F' },
         ]}
-        onChange={(value) => {
-          prefer({ unit: value });
-        }}
+        onChange={(value) => prefer({ unit: value })}
       />
       <LanguageChoice />
       <ul className="menu-list">
         {entry(S.savePng, () => void saveMapOrSay())}
         {entry(S.saveCsv, saveTable)}
-        {entry(S.print, () => {
-          window.print();
-        })}
+        {entry(S.print, () => window.print())}
         <li>
           <a href={reportLink()} target="_blank" rel="noopener" onClick={close}>
             {S.report}
@@ -99,9 +93,7 @@ function LanguageChoice(): JSX.Element {
       <select
         value={LANGUAGE}
         data-testid="language"
-        onChange={(event) => {
-          window.location.assign(viewAddress({ lang: event.target.value }));
-        }}
+        onChange={(event) => window.location.assign(viewAddress({ lang: event.target.value }))}
       >
         {LANGUAGES.map((each) => (
           <option key={each} value={each} lang={each}>
@@ -127,9 +119,7 @@ export function SignOut({
     fetchSession(abort.signal).then(setSession, () => {
       // Without a session there is nothing to offer.
     });
-    return () => {
-      abort.abort();
-    };
+    return () => abort.abort();
   }, []);
   if (!session?.can_sign_out) return null;
   const end = async (): Promise<void> => {

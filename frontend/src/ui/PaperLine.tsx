@@ -21,14 +21,10 @@ export function PaperLine(): JSX.Element | null {
   useEffect(() => {
     const onPrint = (): void => {
       // Render synchronously: a page being printed gets no further frame.
-      flushSync(() => {
-        setPrintedAt(timeOfDay());
-      });
+      flushSync(() => setPrintedAt(timeOfDay()));
     };
     window.addEventListener('beforeprint', onPrint);
-    return () => {
-      window.removeEventListener('beforeprint', onPrint);
-    };
+    return () => window.removeEventListener('beforeprint', onPrint);
   }, []);
   if (takenAt === undefined) return null;
   const then = moment ?? ownAt;

@@ -61,9 +61,7 @@ export function SensorPicker(): JSX.Element {
             </>
           ),
         }))}
-        onChange={(name) => {
-          act({ sensor: name });
-        }}
+        onChange={(name) => act({ sensor: name })}
       />
     </div>
   );

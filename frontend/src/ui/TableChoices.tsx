@@ -34,9 +34,7 @@ export function TableChoices(): JSX.Element {
             key={id}
             label={label}
             isOn={isColumnShown({ hidden }, id)}
-            onChange={(isOn) => {
-              prefer({ hidden: withColumn(hidden, id, isOn) });
-            }}
+            onChange={(isOn) => prefer({ hidden: withColumn(hidden, id, isOn) })}
           />
         ))}
       </fieldset>
@@ -44,9 +42,7 @@ export function TableChoices(): JSX.Element {
         <Check
           label={S.tableByArea}
           isOn={isByArea}
-          onChange={(isOn) => {
-            prefer({ byArea: isOn });
-          }}
+          onChange={(isOn) => prefer({ byArea: isOn })}
         />
       )}
     </>

@@ -59,13 +59,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           <bdi>{S.card(shown(tagId, 24))}</bdi>
         </h2>
         {health && <HealthMark verdict={health.verdict} />}
-        <IconButton
-          icon="close"
-          label={S.cardClose}
-          onClick={() => {
-            act(withTag(null));
-          }}
-        />
+        <IconButton icon="close" label={S.cardClose} onClick={() => act(withTag(null))} />
       </header>
       {tag ? (
         <CardBody tag={tag} health={health} source={source} />

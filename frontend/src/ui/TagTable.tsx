@@ -79,9 +79,7 @@ export function TagTable(): JSX.Element {
       data-testid="tag-table"
       style={{ '--sensors': sensors.length } as CSSProperties}
       aria-rowcount={lines.length + 1}
-      onFocus={(event) => {
-        setFocused(rowTag(event));
-      }}
+      onFocus={(event) => setFocused(rowTag(event))}
       onBlur={({ currentTarget, relatedTarget }) => {
         // Focus moving to another row must find that row still rendered.
         if (!currentTarget.contains(relatedTarget)) setFocused(null);
@@ -277,12 +275,7 @@ function ColumnHead({
       data-column={id}
       aria-sort={own ? (sort.descending ? 'descending' : 'ascending') : 'none'}
     >
-      <button
-        type="button"
-        onClick={() => {
-          act(withSort(id));
-        }}
-      >
+      <button type="button" onClick={() => act(withSort(id))}>
         <span>{children}</span>
         <span className="sort-mark" data-on={own}>
           <Icon name={own && sort.descending ? 'down' : 'up'} size={14} />

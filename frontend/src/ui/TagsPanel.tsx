@@ -65,9 +65,7 @@ function Rows(): JSX.Element {
 }
 
 const saveTable = (): void => {
-  void loadParts().then((parts) => {
-    parts.saveTable();
-  });
+  void loadParts().then((parts) => parts.saveTable());
 };
 
 /** On paper: says that the table has more rows than are printed. */
@@ -91,9 +89,7 @@ function FilterBar(): JSX.Element {
         label={S.filter}
         placeholder={S.filterHint}
         value={filter}
-        onChange={(text) => {
-          act({ filter: text });
-        }}
+        onChange={(text) => act({ filter: text })}
       />
       <span className="count" role="status" data-all={count === all} data-testid="row-count">
         {hasSnapshot && S.shownOf(count, all)}

@@ -36,9 +36,7 @@ export function useFitting(list: RefObject<HTMLElement | null>, all: number): nu
     const watch = new ResizeObserver(look);
     watch.observe(box);
     for (const entry of entries.children) watch.observe(entry);
-    return () => {
-      watch.disconnect();
-    };
+    return () => watch.disconnect();
   });
   return Math.min(count, all);
 }

@@ -8,12 +8,8 @@ export function startKeys(): () => void {
       parts.onKey(event);
       return;
     }
-    void loadParts().then(({ onKey }) => {
-      onKey(event);
-    });
+    void loadParts().then(({ onKey }) => onKey(event));
   };
   document.addEventListener('keydown', onKeyDown);
-  return () => {
-    document.removeEventListener('keydown', onKeyDown);
-  };
+  return () => document.removeEventListener('keydown', onKeyDown);
 }

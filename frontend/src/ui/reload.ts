@@ -23,6 +23,4 @@ export function reloadByItself(reload: () => void = reloadNow): () => void {
   };
 }
 
-export const reloadNow = (): void => {
-  window.location.reload();
-};
+export const reloadNow = (): void => window.location.reload();

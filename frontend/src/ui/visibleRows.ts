@@ -113,9 +113,7 @@ export function usePaper(): boolean {
   useEffect(() => {
     const onPrint = ({ type }: Event): void => {
       // Render synchronously: a page being printed gets no further frame.
-      flushSync(() => {
-        setPaper(type === 'beforeprint');
-      });
+      flushSync(() => setPaper(type === 'beforeprint'));
     };
     window.addEventListener('beforeprint', onPrint);
     window.addEventListener('afterprint', onPrint);
@@ -157,12 +155,8 @@ export function useChosenInSight(
   useEffect(() => {
     const frame = body.current?.closest('.table-scroll, .alarms');
     if (chosen === null || !frame) return undefined;
-    const painted = requestAnimationFrame(() => {
-      keepInView(frame, chosen, frame.clientHeight);
-    });
-    return () => {
-      cancelAnimationFrame(painted);
-    };
+    const painted = requestAnimationFrame(() => keepInView(frame, chosen, frame.clientHeight));
+    return () => cancelAnimationFrame(painted);
   }, [body, chosen, place]);
 }
 
@@ -208,11 +202,7 @@ export function useHeldRows() {
   return {
     /** Rows, with area headings between them. */
     lines,
-    onPointerEnter: () => {
-      setHeld(new Map(rows.map(({ tag }, index) => [tag.id, index])));
-    },
-    onPointerLeave: () => {
-      setHeld(null);
-    },
+    onPointerEnter: () => setHeld(new Map(rows.map(({ tag }, index) => [tag.id, index]))),
+    onPointerLeave: () => setHeld(null),
   };
 }

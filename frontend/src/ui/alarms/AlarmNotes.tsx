@@ -91,12 +91,7 @@ export function Meanwhile(): JSX.Element | null {
     <div className="meanwhile" data-testid="meanwhile" data-health={verdict}>
       <HealthMark verdict={verdict} word={false} />
       <strong>{text}</strong>
-      <button
-        type="button"
-        onClick={() => {
-          act({ moment: null, selected: alarm.tag_id || null });
-        }}
-      >
+      <button type="button" onClick={() => act({ moment: null, selected: alarm.tag_id || null })}>
         {alarm.tag_id === '' ? S.backToLive : S.meanwhileShow(shown(alarm.tag_id, 24))}
       </button>
     </div>

@@ -101,9 +101,7 @@ export function AlarmPanel(): JSX.Element {
             type="button"
             className="text-button acknowledge-all"
             disabled={waiting.length === 0 || isRefused}
-            onClick={ignoreDoubleClick(() => {
-              acknowledgeAlarms(waiting);
-            })}
+            onClick={ignoreDoubleClick(() => acknowledgeAlarms(waiting))}
           >
             <Icon name="check" size={18} /> {S.alarmAll(S.alarmAcknowledge, waiting.length)}
           </button>
@@ -171,9 +169,7 @@ function Group({
             type="button"
             className="text-button"
             aria-expanded={isOpen}
-            onClick={() => {
-              setOpen(!isOpen);
-            }}
+            onClick={() => setOpen(!isOpen)}
           >
             {heading} <Icon name="chevron" />
           </button>
@@ -207,9 +203,7 @@ function Rows({
           items={items}
           group={group}
           isOpen={shown.length > 0}
-          onToggle={() => {
-            setMost(most > 0 ? 0 : MOST_ROWS);
-          }}
+          onToggle={() => setMost(most > 0 ? 0 : MOST_ROWS)}
         />
       )}
       {shown.length > 0 && (
@@ -223,9 +217,7 @@ function Rows({
         <button
           type="button"
           className="text-button alarm-more"
-          onClick={() => {
-            setMost(most + MOST_ROWS);
-          }}
+          onClick={() => setMost(most + MOST_ROWS)}
         >
           {S.attentionMore(Math.min(rest, MOST_ROWS))}
         </button>
@@ -246,15 +238,9 @@ function useHeldOrder(list: AlarmList) {
   return {
     ...heldList(held ?? list, list),
     /** Shows the new alarms, and holds that order. */
-    showNew: () => {
-      setHeld(null);
-    },
-    onPointerEnter: () => {
-      setPointer(true);
-    },
-    onPointerLeave: () => {
-      setPointer(false);
-    },
+    showNew: () => setHeld(null),
+    onPointerEnter: () => setPointer(true),
+    onPointerLeave: () => setPointer(false),
     // A clicked button keeps the focus; without `:focus-visible` it holds nothing once the pointer leaves.
     onFocus: ({ target, currentTarget }: FocusEvent) => {
       setFocus(target !== currentTarget && target.matches(':focus-visible'));

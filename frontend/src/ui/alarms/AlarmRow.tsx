@@ -42,9 +42,7 @@ export const AlarmRow = memo(function AlarmRow({
         type="button"
         className="alarm-go"
         title={S.alarmShow}
-        onClick={ignoreDoubleClick(() => {
-          showAlarm(alarm);
-        })}
+        onClick={ignoreDoubleClick(() => showAlarm(alarm))}
       >
         <AlarmTimes
           alarm={alarm}

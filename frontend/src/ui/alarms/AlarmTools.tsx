@@ -79,9 +79,7 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person);
   const isRefused = useIsRefused();
-  useLayoutEffect(() => {
-    root.current?.scrollIntoView({ block: 'nearest' });
-  }, [form]);
+  useLayoutEffect(() => root.current?.scrollIntoView({ block: 'nearest' }), [form]);
   const oldest = oldestOf(items);
   const acknowledged = items.filter(
     ({ isAcknowledged, alarm: { acknowledged_by: by } }) =>
@@ -101,11 +99,7 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
     some: readonly Item[],
     action: (some: readonly Item[]) => void,
   ): JSX.Element | false =>
-    mayAct(who) &&
-    some.length > 0 &&
-    act(allText(text, some, items), () => {
-      action(some);
-    });
+    mayAct(who) && some.length > 0 && act(allText(text, some, items), () => action(some));
   const then = (action: (some: readonly Item[]) => void) => (some: readonly Item[]) => {
     close();
     action(some);
@@ -136,15 +130,11 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
             )}
           {onAll(S.alarmUnacknowledge, acknowledged, then(unacknowledgeAlarms))}
           {onAll(S.alarmUnshelve, shelved, then(unshelveAlarms))}
-          {onAll(S.alarmShelve, open, () => {
-            setForm('shelve');
-          })}
+          {onAll(S.alarmShelve, open, () => setForm('shelve'))}
           {/* A comment is about one alarm. */}
           {items.length === 1 &&
             who?.can_write_notes === true &&
-            act(C.comment, () => {
-              setForm('comment');
-            })}
+            act(C.comment, () => setForm('comment'))}
         </ul>
       )}
     </div>
@@ -178,9 +168,7 @@ function Shelving({ items, title }: { items: readonly Item[]; title: string }): 
           required={isNeeded}
           maxLength={LONGEST_REASON}
           autoComplete="off"
-          onChange={(event) => {
-            setReason(event.target.value);
-          }}
+          onChange={(event) => setReason(event.target.value)}
         />
       </label>
       <div className="shelf-times">

@@ -49,9 +49,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
         <button
           type="button"
           disabled={isRefused}
-          onClick={ignoreDoubleClick(() => {
-            acknowledgeAlarms(waiting);
-          })}
+          onClick={ignoreDoubleClick(() => acknowledgeAlarms(waiting))}
         >
           {waiting.length === 1
             ? S.alarmAcknowledge
@@ -94,9 +92,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
                 <button
                   type="button"
                   disabled={isRefused}
-                  onClick={ignoreDoubleClick(() => {
-                    unshelveAlarms([{ alarm }]);
-                  })}
+                  onClick={ignoreDoubleClick(() => unshelveAlarms([{ alarm }]))}
                 >
                   {S.alarmUnshelve}
                 </button>

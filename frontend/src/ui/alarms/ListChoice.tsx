@@ -42,9 +42,7 @@ export function SearchField({
         autoComplete="off"
         spellCheck={false}
         maxLength={LONGEST_FILTER}
-        onChange={(event) => {
-          onChange(event.target.value);
-        }}
+        onChange={(event) => onChange(event.target.value)}
         onKeyDown={(event) => {
           if (event.key !== 'Escape' || value === '') return;
           onChange('');
@@ -68,9 +66,7 @@ export function ListChoice(): JSX.Element {
         { value: 'tags', label: S.tags },
         { value: 'alarms', label: <AlarmsLabel /> },
       ]}
-      onChange={(chosen) => {
-        act(withList(chosen));
-      }}
+      onChange={(chosen) => act(withList(chosen))}
     />
   );
 }

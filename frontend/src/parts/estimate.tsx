@@ -253,18 +253,15 @@ export function AdviceMarks(): JSX.Element {
   const { value, state, message } = useEstimateQuery<Advice>('advice', 'places', PLACES);
   const { scale } = useApp((shownIn) => shownIn.viewport.view);
   const places = isNow ? value?.places : undefined;
-  useEffect(
-    () =>
-      keepClear(
-        (places ?? []).map((place) => ({
-          left: place.x * scale - MARK_PX,
-          top: -place.y * scale - MARK_PX,
-          right: place.x * scale + MARK_PX,
-          bottom: -place.y * scale + MARK_PX,
-        })),
-      ),
-    [places, scale],
-  );
+  useEffect(() => {
+    const marks = (places ?? []).map((place) => ({
+      left: place.x * scale - MARK_PX,
+      top: -place.y * scale - MARK_PX,
+      right: place.x * scale + MARK_PX,
+      bottom: -place.y * scale + MARK_PX,
+    }));
+    return keepClear(marks);
+  }, [places, scale]);
   if (!isNow) return <Note text={E.adviceNow} />;
   if (!value) {
     return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;

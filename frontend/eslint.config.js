@@ -30,6 +30,14 @@ export default tseslint.config(
       ],
       // A handler of one call needs no braces.
       '@typescript-eslint/no-confusing-void-expression': ['error', { ignoreArrowShorthand: true }],
+      'no-restricted-syntax': [
+        'error',
+        {
+          selector:
+            'CallExpression[callee.name=/Effect$/] > ArrowFunctionExpression:first-child > :matches(CallExpression, ChainExpression).body',
+          message: 'React calls what an effect returns: put its call in braces.',
+        },
+      ],
       'max-lines': ['error', { max: 400 }],
       'no-console': 'error',
     },

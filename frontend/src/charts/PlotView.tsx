@@ -47,7 +47,9 @@ export function PlotView({
   const only = isAlone ? model.lines[0] : undefined;
 
   const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
-  useEffect(() => pointOn(plot.current, pointed), [plot, pointed, model]);
+  useEffect(() => {
+    pointOn(plot.current, pointed);
+  }, [plot, pointed, model]);
 
   return (
     <section

@@ -226,12 +226,23 @@ export interface components {
             readonly message: string;
             readonly count: number;
         };
+        readonly Robot: {
+            readonly position: components["schemas"]["RobotPosition"] | null;
+            readonly plan: components["schemas"]["RobotPlan"] | null;
+            readonly battery: components["schemas"]["RobotBattery"] | null;
+            readonly trail: readonly components["schemas"]["RobotPoint"][];
+        };
         readonly RobotBattery: {
             readonly percent: number;
             readonly observed_at: components["schemas"]["Time"];
         };
         readonly RobotPlan: {
             readonly points: readonly (readonly number[])[];
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPoint: {
+            readonly x: number;
+            readonly y: number;
             readonly observed_at: components["schemas"]["Time"];
         };
         readonly RobotPosition: {

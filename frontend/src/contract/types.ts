@@ -57,6 +57,7 @@ export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
 /** The robot's own report, and its track. */
 export type RobotNow = Omit<RobotFrame, 'type'>;
+export type Robot = Schemas['Robot'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];
 

@@ -135,7 +135,9 @@ export function CommentField({
   const [fault, setFault] = useState('');
   const [isSending, setSending] = useState(false);
   const field = useRef<HTMLTextAreaElement>(null);
-  useEffect(() => field.current?.focus(), []);
+  useEffect(() => {
+    field.current?.focus();
+  }, []);
   const send = (event: SyntheticEvent): void => {
     event.preventDefault();
     setSending(true);

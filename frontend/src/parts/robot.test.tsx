@@ -5,7 +5,7 @@ import { moveViewport } from '../store/app';
 import { marksOnMap, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { extended, RobotFact, RobotLayer, robotText } from './robot';
+import { extended, RobotFact, RobotLayer, robotText, trailPath } from './robot';
 
 const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
 const robot = {
@@ -81,10 +81,18 @@ test.each([
   expect(screen.getByTestId('robot').dataset['freshness']).toBe('old');
 });
 
-test('the trail is the last three metres: a longer one would hide the field', () => {
-  let trail: ReturnType<typeof extended> = [];
-  for (let x = 0; x < 20; x++) trail = extended(trail, [x, 0]);
-  expect(trail.map(([x]) => x)).toEqual([16, 17, 18, 19]);
-  expect(extended(trail, [19.02, 0])).toBe(trail);
-  expect(extended(trail, [25, 0]), 'an unknown way').toEqual([[25, 0]]);
+const at = (x: number, sec: number): Parameters<typeof extended>[1] => ({
+  x,
+  y: 0,
+  observed_at: time(sec),
+});
+
+test('the trail is the last hour, by what is apart; a clock that went back drops later points', () => {
+  let trail = [0, 1, 2].reduce((last, x) => extended(last, at(x, x)), extended([], at(0, 0)));
+  expect(trail.map(({ x }) => x)).toEqual([0, 1, 2]);
+  expect(extended(trail, at(2.05, 100))).toBe(trail);
+  trail = extended(trail, at(9, 3_601));
+  expect(trail.map(({ x }) => x)).toEqual([1, 2, 9]);
+  expect(trailPath(trail), 'broken where the way is unknown').toBe('M1 0L2 0M9 0');
+  expect(extended(trail, at(9, 1)).map(({ x }) => x)).toEqual([1, 9]);
 });

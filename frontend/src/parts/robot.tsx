@@ -3,11 +3,12 @@ import '../styles/robot.css';
 import { type JSX, type ReactPortal, useEffect, useState } from 'react';
 import { createPortal } from 'react-dom';
 
-import type { RobotNow, WireTime } from '../contract/types';
+import { answer } from '../contract/api';
+import type { Robot, RobotNow, WireTime } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
-import { act, type AppState, store, useApp } from '../store/app';
+import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { keepClear, robotFrame, useSelected } from '../store/create';
 import { isReceivingNow, rosNow, selectLatest, selectShown } from '../store/moment';
@@ -38,8 +39,6 @@ export function RobotLayer(): ReactPortal | null {
   const looks = isLive === 'live' && isReceiving ? 'live' : 'old';
   const at = position && toCanvas(view, mapPoint(position.x, position.y));
   useClearOfLabels(at && [at.x - view.x, at.y - view.y], isLive === 'old');
-  const text = (points: readonly (readonly number[])[]): string =>
-    points.map((point) => point.join(',')).join(' ');
   const map = document.getElementById('map-view');
   if (!map) return null;
   // Inside the map, below everything drawn over it.
@@ -47,8 +46,13 @@ export function RobotLayer(): ReactPortal | null {
     <>
       <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-freshness={looks}>
         <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
-          <polyline className="robot-trail" points={text(trail)} />
-          {plan && <polyline className="robot-plan" points={text(plan.points)} />}
+          <path className="robot-trail" d={trailPath(trail)} />
+          {plan && (
+            <polyline
+              className="robot-plan"
+              points={plan.points.map((point) => point.join(',')).join(' ')}
+            />
+          )}
         </g>
       </svg>
       {position && at && (
@@ -85,7 +89,7 @@ const AGE_PX = 84;
 const CLEAR_STEP_PX = 12;
 
 /** Keeps labels off the mark; `at`: its middle, pixels from the map's origin. */
-function useClearOfLabels(at: Place | null, hasAge: boolean): void {
+function useClearOfLabels(at: readonly [number, number] | null, hasAge: boolean): void {
   const start = (value: number): number =>
     Math.floor((value - MARK_PX) / CLEAR_STEP_PX) * CLEAR_STEP_PX;
   const left = at && start(at[0]);
@@ -148,42 +152,56 @@ export function ageOf(stamp: WireTime, time: number | null): number | null {
   return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);
 }
 
-/** Where the robot has just come from, by the positions received. */
-function useTrail(): readonly Place[] {
-  const [trail, setTrail] = useState(() => followed([]));
-  useEffect(
-    () =>
-      robotFrame.subscribe(() => {
-        setTrail(followed);
-      }),
-    [],
-  );
+/** Pause between attempts to fetch the trail, ms. */
+const PACE_MS = 5_000;
+
+/** The robot's trail: fetched from the bridge, then extended by received positions. */
+function useTrail(): readonly Point[] {
+  const [trail, setTrail] = useState<readonly Point[]>([]);
+  useEffect(() => {
+    const stop = keepFetched<Robot>(
+      { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail) },
+      ({ twin }) =>
+        twin.connection.socket.kind === 'open'
+          ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
+          : null,
+    );
+    const unsubscribe = robotFrame.subscribe(() => {
+      const position = robotFrame.get()?.position;
+      if (position) setTrail((last) => extended(last, position));
+    });
+    return () => {
+      stop();
+      unsubscribe();
+    };
+  }, []);
   return trail;
 }
 
-function followed(trail: readonly Place[]): readonly Place[] {
-  const position = robotFrame.get()?.position;
-  return position ? extended(trail, [position.x, position.y]) : trail;
-}
+type Point = Robot['trail'][number];
 
-/** Length of the trail: a longer one hides what the patrol crosses. */
-const TRAIL_M = 3;
-/** Least distance between two of its points. */
-const STEP_M = 0.05;
+/** Age of the oldest point, s. */
+const TRAIL_S = 3_600;
+/** Least distance between two points, as in the bridge, m. */
+const STEP_M = 0.1;
+/** The way between points farther apart is unknown, m. */
+const GAP_M = 3;
 
-/** The trail with one more place; unchanged if that is too close. After a jump, the way there is unknown. */
-export function extended(trail: readonly Place[], next: Place): readonly Place[] {
+/** The trail with one more point; unchanged if that is too close. A clock that went back drops later ones. */
+export function extended(trail: readonly Point[], next: Point): readonly Point[] {
   const last = trail.at(-1);
-  if (last && apart(last, next) < STEP_M) return trail;
-  if (!last || apart(last, next) > TRAIL_M) return [next];
-  let length = apart(last, next);
-  const tail = trail.findLastIndex((place, index) => {
-    length += apart(place, trail[index + 1] ?? place);
-    return length > TRAIL_M;
-  });
-  return [...trail.slice(tail + 1), next];
+  const ageOfPoint = (it: Point): number => secondsOf(next.observed_at) - secondsOf(it.observed_at);
+  if (last && ageOfPoint(last) >= 0 && apart(last, next) < STEP_M) return trail;
+  return [...trail.filter((it) => ageOfPoint(it) >= 0 && ageOfPoint(it) <= TRAIL_S), next];
 }
 
-type Place = readonly [number, number];
+/** The trail as an SVG path in metres, with a break where the way is unknown. */
+export const trailPath = (trail: readonly Point[]): string =>
+  trail
+    .map((it, index) => {
+      const last = trail[index - 1];
+      return `${last && apart(last, it) <= GAP_M ? 'L' : 'M'}${it.x} ${it.y}`;
+    })
+    .join('');
 
-const apart = (a: Place, b: Place): number => Math.hypot(a[0] - b[0], a[1] - b[1]);
+const apart = (a: Point, b: Point): number => Math.hypot(a.x - b.x, a.y - b.y);

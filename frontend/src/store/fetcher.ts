@@ -202,7 +202,9 @@ export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetche
     setFetched(({ value }) => ({ value, state: 'waiting', message: '' }));
   }
   // An unchanged task has no effect.
-  useEffect(() => fetcher.want(task));
+  useEffect(() => {
+    fetcher.want(task);
+  });
   useEffect(() => () => fetcher.want(null), [fetcher]);
   return fetched;
 }

@@ -204,11 +204,11 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
         with closing(sqlite3.connect(path)) as file:
             file.execute("DROP TABLE audit")
         refused = live.get("/api/audit", {"Authorization": f"Bearer boss-{TOKEN}"})
-        assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
+        assert (refused.status_code, "cannot be used" in refused.text) == (503, True)
         with open_websocket(ws, additional_headers=BEARER) as stream:
             path.unlink()
             refused = live.get("/api/state", BEARER)
-            assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
+            assert (refused.status_code, "cannot be used" in refused.text) == (503, True)
             with live.client() as browser:
                 refused = sign_in(browser, "anna")
             assert (refused.status_code, path.name in refused.text) == (503, False)

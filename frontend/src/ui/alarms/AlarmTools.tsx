@@ -79,7 +79,9 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person);
   const isRefused = useIsRefused();
-  useLayoutEffect(() => root.current?.scrollIntoView({ block: 'nearest' }), [form]);
+  useLayoutEffect(() => {
+    root.current?.scrollIntoView({ block: 'nearest' });
+  }, [form]);
   const oldest = oldestOf(items);
   const acknowledged = items.filter(
     ({ isAcknowledged, alarm: { acknowledged_by: by } }) =>

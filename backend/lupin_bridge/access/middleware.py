@@ -254,7 +254,7 @@ class AccessControl:
             except AccountError as error:
                 # Of a route too. It names the file, and whoever signs in is not known yet.
                 log.warning("%s: a request is refused", error)
-                why = "the accounts cannot be read or changed: the bridge's log says why"
+                why = "the accounts cannot be used: is the disk full? The bridge's log says more"
                 checked = _refusal(503, why, {"retry-after": "5"})
             refusal = checked
         await deny(refusal, scope, receive, send)

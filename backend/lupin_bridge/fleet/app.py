@@ -318,6 +318,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
     @read_route(app.router, "/api/sites/{name}/map.svg", OfPicture)
     async def site_map(request: Request, name: str) -> Response:
         """A picture of where the tags of a site are, and of their verdicts."""
+        read(OfPicture, request.query_params.multi_items())
         site = fleet.watching.sites.get(name)
         if site is None or not site.dots:
             return error_response(f"there is no map of a site {name[:64]!r}", 404)

@@ -349,6 +349,8 @@ class HttpConnection(H11Protocol, SmallReads):
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what the parser rejects, and close; uvicorn calls this from its `except`."""
+        if self.cycle is not None:
+            self.cycle.disconnected = True  # the route's own answer would come after this one
         error = sys.exception()
         status = getattr(error, "error_status_hint", 400)
         body = orjson.dumps({"detail": str(error)[:500] or msg})

@@ -169,6 +169,11 @@ describe.each([
     );
   });
 
+  test.each([words.alarmUnacknowledge, words.alarmUnshelve])('keeps "%s" for all', (action) => {
+    // A noun in lower case, or a second object, would be wrong.
+    if (action.includes(' ')) expect(words.alarmAll(action, 3)).toContain(`${action}:`);
+  });
+
   test('tells everything that English tells of what a text is made of', () => {
     const wrong = english
       .filter(({ at, text }) => marksIn(text).join() !== marksIn(said.get(at) ?? '').join())

@@ -138,6 +138,7 @@ def test_each_site_has_a_small_map(archive: Archive, journal: Path, tmp_path: Pa
         assert len(dots_of(picture.text)["healthy"]) == 30
         again = page.http.get(path, headers={"If-None-Match": picture.headers["etag"]})
         assert again.status_code == 304
+        assert page.http.get(path, params={"w": "1"}).status_code == 400
         now_ns = wall().stamp_ns
         write(journal, [scan("0", now_ns + n, temperature=45.0) for n in range(2)])
         page.site(verdict="critical")

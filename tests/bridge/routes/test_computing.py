@@ -156,6 +156,20 @@ async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Hel
         assert held.begun.count(at_work[0]) == 1, "computed once, for who stayed"
 
 
+async def test_a_malformed_body_has_one_answer_and_fills_no_log(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with greenhouse() as it:
+        reader, writer = await asyncio.open_connection(*it.url.removeprefix("http://").split(":"))
+        writer.write(b"POST /api/notes HTTP/1.1\r\nHost: localhost\r\n")
+        writer.write(b"Transfer-Encoding: chunked\r\n\r\nno chunk\r\n")
+        answer = await reader.read()
+        writer.close()
+        assert (answer[:12], answer.count(b"HTTP/1.1")) == (b"HTTP/1.1 400", 1)
+        await until(lambda: not it.server.server_state.tasks, "the end of the request")
+    assert [record for record in caplog.records if record.levelname == "ERROR"] == []
+
+
 async def test_a_time_out_cancels_the_work_too(
     domain: int, held: Held, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -45,7 +45,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Zum Beginn',
   alarmActionsOf: (what) => `Aktionen: ${what}`,
   alarmAcknowledge: 'Quittieren',
-  alarmAll: (what, count) => `Alle ${what.toLowerCase()} (${count})`,
+  alarmAll: (what, count) =>
+    what.includes(' ') ? `${what}: alle (${count})` : `Alle ${what.toLowerCase()} (${count})`,
   alarmUnacknowledge: 'Quittierung aufheben',
   alarmShelve: 'Zurückstellen',
   alarmShelveHint: 'Bis dahin keine Meldung, außer es wird schlimmer.',

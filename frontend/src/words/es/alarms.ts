@@ -39,7 +39,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Ir al inicio',
   alarmActionsOf: (what) => `Acciones: ${what}`,
   alarmAcknowledge: 'Reconocer',
-  alarmAll: (what, count) => `${what} todas (${count})`,
+  alarmAll: (what, count) => `${what}${what.includes(' ') ? ':' : ''} todas (${count})`,
   alarmUnacknowledge: 'Anular reconocimiento',
   alarmShelve: 'Aplazar',
   alarmShelveHint: 'Sin avisos hasta entonces, salvo que empeore.',

@@ -37,7 +37,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Naar het begin',
   alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
-  alarmAll: (what, count) => `Alle ${what.toLowerCase()} (${count})`,
+  alarmAll: (what, count) =>
+    what.includes(' ') ? `${what}: alle (${count})` : `Alle ${what.toLowerCase()} (${count})`,
   alarmUnacknowledge: 'Bevestiging intrekken',
   alarmShelve: 'Uitstellen',
   alarmShelveHint: 'Tot dan geen melding, tenzij het erger wordt.',

@@ -79,7 +79,10 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person);
   const isRefused = useIsRefused();
-  useLayoutEffect(() => root.current?.scrollIntoView({ block: 'nearest' }), [form]);
+  useLayoutEffect(() => {
+    // Newer browsers return a promise, which React would call as a cleanup.
+    root.current?.scrollIntoView({ block: 'nearest' });
+  }, [form]);
   const oldest = oldestOf(items);
   const acknowledged = items.filter(
     ({ isAcknowledged, alarm: { acknowledged_by: by } }) =>

@@ -9,6 +9,7 @@ import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectLatestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
+import { DEFAULT_VIEW } from '../store/view';
 import { useNow } from '../widgets/useNow';
 import { fetchLines, type Lines, modelOf } from './model';
 
@@ -46,8 +47,11 @@ export function useCharts(
   const visits = useVisits(tagIds);
   const answered = useRef('');
   const oldest = period.kind === 'all' ? (known?.reach?.from ?? null) : null;
-  // How far all of it reaches is not known yet.
-  const isEarly = period.kind === 'all' && known === null && reaching === 'waiting';
+  // How far the past reaches decides how long all of it is, and which period the page opens on.
+  const isEarly =
+    (period.kind === 'all' || period === DEFAULT_VIEW.period) &&
+    known === null &&
+    reaching === 'waiting';
   /** Null while the time is not known. */
   const span = nowS === null ? null : spanOf(period, nowS, oldest);
   const group = JSON.stringify([period, points, dayS, sensors, tagIds]);

@@ -115,7 +115,9 @@ export function createFetcher<T>({
       }
       end();
     }
-    const notBefore = Math.max(calmUntil, retryAt, startedAt + (wanted.paceMs ?? paceMs));
+    // A failure has a pace of its own: a long one would leave a chart empty for many seconds.
+    const paced = failures > 0 ? retryAt : startedAt + (wanted.paceMs ?? paceMs);
+    const notBefore = Math.max(calmUntil, paced);
     if (at < notBefore) timer = setTimeout(pump, notBefore - at);
     else start(wanted);
   };

@@ -44,34 +44,38 @@ export const AlarmRow = memo(function AlarmRow({
         title={S.alarmShow}
         onClick={ignoreDoubleClick(() => showAlarm(alarm))}
       >
-        <AlarmTimes
-          alarm={alarm}
-          first={values.first}
-          // A bad value still counts when it is old; that all was well says nothing about now.
-          verdict={isBack && values.state?.kind === 'unknown' ? 'unknown' : known}
-          // Not from the alarm itself: a held row must not gain a line.
-          isOver={group === 'resolved'}
-        />
-        <span className="alarm-text">
-          <span>
-            <strong>
-              <bdi>{whereText(alarm)}</bdi>
-            </strong>
-            {': '}
-            {values.what}
+        <span className="alarm-main">
+          <AlarmTimes
+            alarm={alarm}
+            first={values.first}
+            // A bad value still counts when it is old; that all was well says nothing about now.
+            verdict={isBack && values.state?.kind === 'unknown' ? 'unknown' : known}
+            // Not from the alarm itself: a held row must not gain a line.
+            isOver={group === 'resolved'}
+          />
+          <span className="alarm-text">
+            <span>
+              <strong>
+                <bdi>{whereText(alarm)}</bdi>
+              </strong>
+              {': '}
+              {values.what}
+            </span>
+            {/* A row held in "active" has no other line for the shelving reason. */}
+            {group === 'active' && item.shelf?.reason && (
+              <q className="faint">{item.shelf.reason}</q>
+            )}
+            {group === 'active' && !item.shelf && (
+              <AlarmTodo
+                text={values.todo}
+                isAgain={isBack}
+                isOfSilence={alarm.reason.kind === 'silent'}
+              />
+            )}
+            {group === 'shelved' && item.shelf && (
+              <span className="alarm-facts faint">{shelvedText(item, item.shelf.reason)}</span>
+            )}
           </span>
-          {/* A row held in "active" has no other line for the shelving reason. */}
-          {group === 'active' && item.shelf?.reason && <q className="faint">{item.shelf.reason}</q>}
-          {group === 'active' && !item.shelf && (
-            <AlarmTodo
-              text={values.todo}
-              isAgain={isBack}
-              isOfSilence={alarm.reason.kind === 'silent'}
-            />
-          )}
-          {group === 'shelved' && item.shelf && (
-            <span className="alarm-facts faint">{shelvedText(item, item.shelf.reason)}</span>
-          )}
         </span>
         <AlarmFacts alarm={alarm} values={values} />
       </button>

@@ -76,29 +76,31 @@ export function CauseHeading({
           if (isOfOne) showAlarm(alarm);
         }}
       >
-        <AlarmTimes alarm={times} first={null} verdict={verdict} isOver={isOver} />
-        <span className="alarm-text">
-          <span>
-            <strong>{isOfOne ? S.alarmWhat(whereText(alarm), cause) : cause}</strong>{' '}
-            <span className="alarm-many">
-              {S.alarmCount(own.length)}{' '}
-              {!isOfOne &&
-                own.length > 0 &&
-                counts.length > 1 &&
-                counts.map(([each, count]) => (
-                  <Fragment key={each}>
-                    <HealthMark verdict={each} word={false} /> {count}{' '}
-                  </Fragment>
-                ))}
-              <Icon name="chevron" />
+        <span className="alarm-main">
+          <AlarmTimes alarm={times} first={null} verdict={verdict} isOver={isOver} />
+          <span className="alarm-text">
+            <span>
+              <strong>{isOfOne ? S.alarmWhat(whereText(alarm), cause) : cause}</strong>{' '}
+              <span className="alarm-many">
+                {S.alarmCount(own.length)}{' '}
+                {!isOfOne &&
+                  own.length > 0 &&
+                  counts.length > 1 &&
+                  counts.map(([each, count]) => (
+                    <Fragment key={each}>
+                      <HealthMark verdict={each} word={false} /> {count}{' '}
+                    </Fragment>
+                  ))}
+                <Icon name="chevron" />
+              </span>
             </span>
-          </span>
-          {group === 'active' && <AlarmTodo text={todo} />}
-          {group === 'shelved' && (
-            <span className="alarm-facts faint">{[...shelves].join('; ')}</span>
-          )}
-          <span className="alarm-facts faint">
-            {isOfOne && airOf(alarm.reason) ? parts : tagsText(tags)}
+            {group === 'active' && <AlarmTodo text={todo} />}
+            {group === 'shelved' && (
+              <span className="alarm-facts faint">{[...shelves].join('; ')}</span>
+            )}
+            <span className="alarm-facts faint">
+              {isOfOne && airOf(alarm.reason) ? parts : tagsText(tags)}
+            </span>
           </span>
         </span>
         <Values alarm={alarm} of={isOfOne ? '' : whereText(alarm)} />

@@ -161,8 +161,8 @@ async def test_a_malformed_body_has_one_answer_and_fills_no_log(
 ) -> None:
     async with greenhouse() as it:
         reader, writer = await asyncio.open_connection(*it.url.removeprefix("http://").split(":"))
-        writer.write(b"POST /api/notes HTTP/1.1\r\nHost: localhost\r\n")
-        writer.write(b"Transfer-Encoding: chunked\r\n\r\nno chunk\r\n")
+        head = b"POST /api/notes HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n"
+        writer.write(head + b"no chunk\r\n")  # at once: else the head alone is refused
         answer = await reader.read()
         writer.close()
         assert (answer[:12], answer.count(b"HTTP/1.1")) == (b"HTTP/1.1 400", 1)

@@ -107,12 +107,11 @@ class BehindProxies:
             peer = (scope.get("client") or ("", 0))[0]
             peer = str(_address(peer) or peer) or UNIX
             user = self._user(scope) if peer in self._app.trusted_hosts else {}
-            # Of several proxies, the first has received the client's own request.
-            headers = [
-                (name, value.partition(b",")[0] if name == b"x-forwarded-proto" else value)
-                for name, value in scope["headers"]
-            ]
-            own = {"client": (peer, 0), "headers": headers}
+            # Of several proxies, the first has received the client's own request; of several lines
+            # of a header, the middleware reads the last.
+            said = [it for it in scope["headers"] if it[0] == b"x-forwarded-proto"][:1]
+            first = [(name, value.partition(b",")[0]) for name, value in said]
+            own = {"client": (peer, 0), "headers": [*scope["headers"], *first]}
             scope = {**scope, **own, **user, **self._path(scope)}
         await self._app(scope, receive, send)
 

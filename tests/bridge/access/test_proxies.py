@@ -76,6 +76,7 @@ def test_the_client_is_the_nearest_address_that_is_not_a_trusted_proxy(
         ("websocket", ["https"], "wss"),
         ("http", ["gopher"], "http"),
         ("http", ["https, http"], "https"),  # the second one was reached by the first
+        ("http", ["https", "http"], "https"),  # lines are one list
     ],
 )
 def test_the_scheme_is_that_of_the_clients_own_request(

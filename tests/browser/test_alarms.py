@@ -147,8 +147,9 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_needs_a_reason(
         # A small laptop or screen has no more lines.
         for size in ((1280, 720), (1024, 768)):
             hmi.resize(*size)
-            highs = [place(row).bottom - place(row).top for row in rows(hmi, "active").all()]
-            assert max(highs) <= 64, size
+            assert max(it.bottom - it.top for it in map(place, rows(hmi, "active").all())) <= 64, (
+                size
+            )
         hmi.resize(**WIDE)
         # The critical one.
         expect(times).to_have_text(["For 15 min", "For 1 h"])

@@ -38,7 +38,7 @@ export class ErrorBoundary extends Component<{
 function Failed({ why }: { why: string }): JSX.Element {
   // Nobody may be there to press the button. An updated server's new page reads what the old one could not.
   useEffect(() => {
-    reloadByItself();
+    return reloadByItself();
   }, []);
   return (
     <main className="failed-page" role="alert" data-testid="failed-page">

@@ -4,11 +4,8 @@ import { deferred, loadParts } from './loadDeferred';
 export function startKeys(): () => void {
   const onKeyDown = (event: KeyboardEvent): void => {
     const { parts } = deferred.get();
-    if (parts) {
-      parts.onKey(event);
-      return;
-    }
-    void loadParts().then(({ onKey }) => onKey(event));
+    if (parts) parts.onKey(event);
+    else void loadParts().then(({ onKey }) => onKey(event));
   };
   document.addEventListener('keydown', onKeyDown);
   return () => document.removeEventListener('keydown', onKeyDown);

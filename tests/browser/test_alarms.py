@@ -235,7 +235,7 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
             return apart(content.locator("> *").last, news)
 
         hmi.expect(is_clear, "the card's end clear of the message")
-        assert news.get_by_role("button").evaluate(LINES) == 1
+        assert news.get_by_role("button", name="Back to live").evaluate(LINES) == 1
         news.get_by_role("button", name="Back to live, show tag b").click()
         expect(hmi.card("b")).to_be_visible()
 

@@ -18,7 +18,14 @@ import {
   unshelveAlarms,
 } from './own';
 import { calling } from './list';
-import { alarmList, meanwhile, onNews, startAlarms, startMeanwhile } from './watch';
+import {
+  alarmList,
+  dismissMeanwhile,
+  meanwhile,
+  onNews,
+  startAlarms,
+  startMeanwhile,
+} from './watch';
 
 const STRESSED = { verdict: 'stressed' } as const;
 let stops: (() => void)[];
@@ -172,7 +179,7 @@ test('what another tab of the browser has acknowledged is so here', () => {
   expect(ids()).toEqual([]);
 });
 
-test('while a past moment is shown, new alarms are listed apart until acknowledged or resolved', () => {
+test('while a past moment is shown, new alarms are listed apart until acknowledged, resolved or dismissed', () => {
   const now = (): string[] => meanwhile.get().map(({ alarm: { id } }) => id);
   reportAlarms(alarm('a'));
   act({ moment: 50 });
@@ -188,6 +195,9 @@ test('while a past moment is shown, new alarms are listed apart until acknowledg
   expect(now()).toEqual([]);
   reportAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
   expect(now()).toEqual(['d']);
+  dismissMeanwhile();
+  reportAlarms(alarm('e', { tag_id: '5' }), alarm('d', { tag_id: '4' }), alarm('a'));
+  expect(now()).toEqual(['e']);
   act({ moment: null });
   expect(now()).toEqual([]);
   act({ moment: 60 });

@@ -83,8 +83,16 @@ const idsOf = (alarms: Alarms | null): ReadonlySet<string> | null =>
 /** Alarms raised while a past moment is shown that still need attention (`calling`), the worst first. */
 export const meanwhile = createStore<readonly Item[]>([]);
 
+/** Ids of all that were raised since the past is shown. */
+let ids: ReadonlySet<string> = new Set();
+
+/** They have been read; later ones are listed again. */
+export function dismissMeanwhile(): void {
+  ids = new Set();
+  meanwhile.set([]);
+}
+
 export function startMeanwhile(): () => void {
-  let ids: ReadonlySet<string> = new Set();
   const update = (): void => {
     if (store.get().view.moment === null) ids = new Set();
     const before = meanwhile.get();

@@ -196,7 +196,7 @@ function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Eleme
           {shown(tagId, 16)}
         </Fragment>
       ))}
-      {more > 0 && ` ${S.attentionMore(more)}`}{' '}
+      {S.further(more)}{' '}
     </span>
   );
 }

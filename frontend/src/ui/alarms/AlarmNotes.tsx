@@ -4,7 +4,7 @@ import { alarmOf, isAwaited } from '../../alarms/list';
 import { isPushed, notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
 import { lastAction, own, undo } from '../../alarms/own';
 import { severalNow } from '../../alarms/latest';
-import { alarmList, meanwhile } from '../../alarms/watch';
+import { alarmList, dismissMeanwhile, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
@@ -17,7 +17,7 @@ import {
   selectShown,
 } from '../../store/moment';
 import { S } from '../../strings';
-import { Check } from '../../widgets/controls';
+import { Check, IconButton } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
 import { ignoreDoubleClick } from './AlarmTools';
@@ -94,6 +94,7 @@ export function Meanwhile(): JSX.Element | null {
       <button type="button" onClick={() => act({ moment: null, selected: alarm.tag_id || null })}>
         {alarm.tag_id === '' ? S.backToLive : S.meanwhileShow(shown(alarm.tag_id, 24))}
       </button>
+      <IconButton icon="close" label={S.cardClose} onClick={dismissMeanwhile} />
     </div>
   );
 }

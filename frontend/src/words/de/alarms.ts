@@ -4,7 +4,7 @@ import type { In } from '../shape';
 import { counted } from './counted';
 
 /** Alarme oder Messpunkte, die nicht genannt sind. */
-const furtherText = (more: number): string =>
+const further = (more: number): string =>
   more > 0 ? ` und ${counted(more, 'weiterer', 'weitere')}` : '';
 
 export const ALARMS: In<typeof EN.ALARMS> = {
@@ -75,8 +75,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmSaveCsv: 'Alarme als CSV speichern',
   alarmsNoMatch: 'Kein Alarm passt zum Filter.',
   alarmCount: (count) => counted(count, 'Alarm', 'Alarme'),
+  further,
   alarmTags: (tags, more) =>
-    `${tags.length === 1 ? 'Messpunkt' : 'Messpunkte'} ${tags.join(', ')}${furtherText(more)}`,
+    `${tags.length === 1 ? 'Messpunkt' : 'Messpunkte'} ${tags.join(', ')}${further(more)}`,
   alarmsNone: 'Keine anstehenden Alarme',
   alarmsNoneHint:
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
@@ -112,8 +113,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   },
   alarmNotifyTitle: (count) => counted(count, 'neuer Alarm', 'neue Alarme'),
 
-  alarmsRaised: (alarms, more) => `Neu: ${alarms.join('; ')}${furtherText(more)}`,
-  alarmsCleared: (alarms, more) => `Behoben: ${alarms.join('; ')}${furtherText(more)}`,
+  alarmsRaised: (alarms, more) => `Neu: ${alarms.join('; ')}${further(more)}`,
+  alarmsCleared: (alarms, more) => `Behoben: ${alarms.join('; ')}${further(more)}`,
   alarmsMeanwhile: (alarm, more) =>
     `Neuer Alarm: ${alarm}${more > 0 ? ` und ${counted(more, 'weiterer Alarm', 'weitere Alarme')}` : ''}`,
 };

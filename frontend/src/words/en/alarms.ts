@@ -1,6 +1,9 @@
 /** Alarms: what is active, shelved and resolved, and how it is notified. */
 import { counted } from './counted';
 
+/** Those that are not named. */
+const further = (more: number): string => (more > 0 ? ` and ${more} more` : '');
+
 export const ALARMS = {
   alarms: 'Alarms',
   listChoice: 'Beside the map',
@@ -74,8 +77,9 @@ export const ALARMS = {
   alarmSaveCsv: 'Save alarms as CSV',
   alarmsNoMatch: 'No alarm matches the filter.',
   alarmCount: (count: number): string => counted(count, 'alarm', 'alarms'),
+  further: (more: number): string => further(more),
   alarmTags: (tags: readonly string[], more: number): string =>
-    `${tags.length === 1 ? 'Tag' : 'Tags'} ${tags.join(', ')}${more > 0 ? ` and ${more} more` : ''}`,
+    `${tags.length === 1 ? 'Tag' : 'Tags'} ${tags.join(', ')}${further(more)}`,
   alarmsNone: 'No alarm is active',
   alarmsNoneHint:
     'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
@@ -112,9 +116,9 @@ export const ALARMS = {
 
   /** For screen readers and notifications; `alarmsMeanwhile` while a past moment is shown. */
   alarmsRaised: (alarms: readonly string[], more: number): string =>
-    `New: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
+    `New: ${alarms.join('; ')}${further(more)}`,
   alarmsCleared: (alarms: readonly string[], more: number): string =>
-    `Resolved: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
+    `Resolved: ${alarms.join('; ')}${further(more)}`,
   alarmsMeanwhile: (alarm: string, more: number): string =>
     `New alarm: ${alarm}${more > 0 ? ` and ${counted(more, 'more alarm', 'more alarms')}` : ''}`,
 } as const;

@@ -3,6 +3,9 @@ import type * as EN from '../en/alarms';
 import type { In } from '../shape';
 import { counted } from './counted';
 
+/** Lo que no se nombra. */
+const further = (more: number): string => (more > 0 ? ` y ${more} más` : '');
+
 export const ALARMS: In<typeof EN.ALARMS> = {
   alarms: 'Alarmas',
   listChoice: 'Junto al mapa',
@@ -69,8 +72,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmSaveCsv: 'Guardar alarmas como CSV',
   alarmsNoMatch: 'Ninguna alarma coincide con el filtro.',
   alarmCount: (count) => counted(count, 'alarma', 'alarmas'),
+  further,
   alarmTags: (tags, more) =>
-    `${tags.length === 1 ? 'Punto' : 'Puntos'} ${tags.join(', ')}${more > 0 ? ` y ${more} más` : ''}`,
+    `${tags.length === 1 ? 'Punto' : 'Puntos'} ${tags.join(', ')}${further(more)}`,
   alarmsNone: 'Ninguna alarma activa',
   alarmsNoneHint:
     'La alarma salta tras dos mediciones anómalas seguidas. Si hay plaga o faltan datos del invernadero, salta enseguida.',
@@ -107,9 +111,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   },
   alarmNotifyTitle: (count) => counted(count, 'alarma nueva', 'alarmas nuevas'),
 
-  alarmsRaised: (alarms, more) => `Nuevas: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
-  alarmsCleared: (alarms, more) =>
-    `Resueltas: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
+  alarmsRaised: (alarms, more) => `Nuevas: ${alarms.join('; ')}${further(more)}`,
+  alarmsCleared: (alarms, more) => `Resueltas: ${alarms.join('; ')}${further(more)}`,
   alarmsMeanwhile: (alarm, more) =>
     `Alarma nueva: ${alarm}${more > 0 ? ` y ${counted(more, 'alarma más', 'alarmas más')}` : ''}`,
 };

@@ -3,6 +3,9 @@ import type * as EN from '../en/alarms';
 import type { In } from '../shape';
 import { counted } from './counted';
 
+/** Wat niet genoemd is. */
+const further = (more: number): string => (more > 0 ? ` en nog ${more}` : '');
+
 export const ALARMS: In<typeof EN.ALARMS> = {
   alarms: 'Alarmen',
   listChoice: 'Naast de kaart',
@@ -67,8 +70,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmSaveCsv: 'Alarmen opslaan als CSV',
   alarmsNoMatch: 'Geen alarm voldoet aan het filter.',
   alarmCount: (count) => counted(count, 'alarm', 'alarmen'),
+  further,
   alarmTags: (tags, more) =>
-    `${tags.length === 1 ? 'Meetpunt' : 'Meetpunten'} ${tags.join(', ')}${more > 0 ? ` en nog ${more}` : ''}`,
+    `${tags.length === 1 ? 'Meetpunt' : 'Meetpunten'} ${tags.join(', ')}${further(more)}`,
   alarmsNone: 'Geen actieve alarmen',
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
@@ -102,9 +106,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   },
   alarmNotifyTitle: (count) => counted(count, 'nieuw alarm', 'nieuwe alarmen'),
 
-  alarmsRaised: (alarms, more) => `Nieuw: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,
-  alarmsCleared: (alarms, more) =>
-    `Opgelost: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,
+  alarmsRaised: (alarms, more) => `Nieuw: ${alarms.join('; ')}${further(more)}`,
+  alarmsCleared: (alarms, more) => `Opgelost: ${alarms.join('; ')}${further(more)}`,
   alarmsMeanwhile: (alarm, more) =>
     `Nieuw alarm: ${alarm}${more > 0 ? ` en nog ${counted(more, 'alarm', 'alarmen')}` : ''}`,
 };

@@ -230,7 +230,7 @@ test('of tags that need the same done the worst stands for all, some by name', (
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(
-      /^CriticalTag 1: .*Heat, or close the vents also tags 2, 3, 4 \+ 1 more $/,
+      /^CriticalTag 1: .*Heat, or close the vents also tags 2, 3, 4 and 1 more $/,
     ),
     expect.stringMatching(/^StressedTag 6: Humidity/),
   ]);

@@ -240,7 +240,7 @@ test('of tags that need the same done the worst stands for all, some by name', (
     showTags(tags, judgement({ ...all, 3: mild, 4: mild, 5: mild }));
   });
   expect(todo.textContent).toMatch(
-    /Heat, or close the vents also tags 2, Stressed 3, 4 \+ 1 more $/,
+    /Heat, or close the vents also tags 2, Stressed 3, 4 and 1 more $/,
   );
   act(() => {
     showTags(tags, judgement({ ...all, 6: [humid] }));

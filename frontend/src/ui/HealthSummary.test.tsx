@@ -251,7 +251,7 @@ test('of tags that need the same done the worst stands for all, some by name', (
     look({ moment: 500 });
     receive(withPast({ at: 500, house: latest }));
   });
-  expect(todo.textContent).toMatch(/^CriticalTag 1: [^H]* also tags 2, 3, 4 \+ 1 more /);
+  expect(todo.textContent).toMatch(/^CriticalTag 1: [^H]* also tags 2, 3, 4 and 1 more /);
   act(() => {
     look({ moment: null });
   });

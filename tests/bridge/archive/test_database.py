@@ -281,11 +281,12 @@ def test_a_month_that_cannot_be_made_holds_up_its_own_rows_alone(
 ) -> None:
     journal = tmp_path / "journal"
     append(journal, [scan("7", TODAY)])
-    with forwarder(archive, journal) as process:
-        with psycopg.connect(archive.owner) as reader:
-            reader.execute("SELECT count(*) FROM scan")
+    with psycopg.connect(archive.owner) as reader:
+        reader.execute("SELECT count(*) FROM scan")
+        with forwarder(archive, journal) as process:
             process.wait_for_output("is not forwarded: the archive cannot be reached or written")
-        wait_until_equal(archive, journal)
+            reader.rollback()
+            wait_until_equal(archive, journal)
     (after,) = {*parts_made(archive)} - {"scan_before", month(TODAY)}
     archive.do(f"DROP TABLE {after}")
     append(journal, [scan("7", TODAY + SECOND)])

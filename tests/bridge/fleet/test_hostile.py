@@ -307,7 +307,7 @@ def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
     archive.do(f"INSERT INTO meta VALUES ('gh2', 'map', '{plan}')")
     with fleet(archive) as running:
         running.site("gh2", is_live=True)
-        for path in ("state", "tags/1", f"state?at={time.time():.0f}", "report", "map"):
+        for path in ("state", "tags/1", f"state?at={int(time.time())}", "report", "map"):
             found = running.http.get(f"/sites/gh2/api/{path}")
             assert (found.status_code, '"?"' in found.text) == (200, True), found.text
         with psycopg.connect(archive.url("gh2"), autocommit=True) as site:

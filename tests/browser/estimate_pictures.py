@@ -165,6 +165,9 @@ def picture(browser: Browser, url: str, path: Path, link: str) -> None:
         expect(page.get_by_test_id("advice")).to_be_visible()
     page.wait_for_load_state("networkidle")
     page.evaluate("document.fonts.ready.then(() => new Promise(requestAnimationFrame))")
+    # A new alarm's note over the past.
+    for close in page.locator(".meanwhile .icon-button:visible").all():
+        close.click()
     shown = page.screenshot() if has_card else page.locator(".map-panel").screenshot()
     save(shown, path)
     context.close()

@@ -295,16 +295,8 @@ class HttpConnection(H11Protocol, SmallReads):
     or its last answer, however often it sends a byte. It has as long to take a piece of an answer.
     """
 
-    def __init__(
-        self,
-        config: Any,
-        server_state: Any,
-        app_state: dict[str, Any],
-        _loop: asyncio.AbstractEventLoop | None = None,
-    ) -> None:
-        super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
-        self._idle_since_s = 0.0
-        self._deadline: asyncio.TimerHandle
+    _idle_since_s = 0.0
+    _deadline: asyncio.TimerHandle
 
     @property
     def waiting_since_s(self) -> float | None:
@@ -317,6 +309,7 @@ class HttpConnection(H11Protocol, SmallReads):
     def connection_made(self, transport: Any) -> None:
         """Start to wait for a request."""
         super().connection_made(transport)
+        self.app_state = {**self.app_state, CONNECTION_KEY: self}
         bound_unsent(transport)
         transport.set_write_buffer_limits(HIGH_WATER_BYTES)
         self._idle_since_s = self.loop.time()

@@ -252,6 +252,7 @@ def check(answer: SeriesPast, request: SeriesRequest, entries: list[Entry], *, n
         size = max(map(abs, values))
         assert math.isclose(mean, sum(values) / n, rel_tol=1e-9, abs_tol=1e-12 * size)
         assert (low, high) == (min(values), max(values))
+        assert low <= mean <= high
 
 
 # For hypothesis: rows in any order, some late, some again; clocks go back.

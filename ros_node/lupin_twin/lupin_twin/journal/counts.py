@@ -374,10 +374,19 @@ class Buckets:
         self.add(index, 1, value, value, value)
 
     def past(self) -> SeriesPast:
-        """The answer; its means have 12 digits: these are the same in SQLite and PostgreSQL."""
+        """The answer; its means have 12 digits: these are the same in SQLite and PostgreSQL.
+
+        They are within minimum and maximum, which have all digits.
+        """
         steps = self.grid
         rows = [
-            (steps.start_ns + index * steps.bucket_ns, n, float(f"{total / n:.12g}"), low, high)
+            (
+                steps.start_ns + index * steps.bucket_ns,
+                n,
+                min(max(float(f"{total / n:.12g}"), low), high),
+                low,
+                high,
+            )
             for index, (n, total, low, high) in sorted(self._found.items())
         ]
         return SeriesPast(steps.start_ns, steps.end_ns, steps.bucket_ns, *zip(*rows, strict=True))

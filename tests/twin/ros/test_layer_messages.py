@@ -1,13 +1,11 @@
 """Layers and marks as messages, and as a viewer reads them."""
 
-from typing import Any
-
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker, MarkerArray
 
-from lupin_twin.ros.layers import COLOURS, MarkerArrays, TagMark, tag_markers
+from lupin_twin.ros.layers import COLOURS, TagMark, marker_array, tag_markers
 
 TAGS = st.builds(
     TagMark,
@@ -22,13 +20,8 @@ TAGS = st.builds(
 def test_an_array_starts_with_a_deletion_followed_by_all_markers(
     marks: list[TagMark], frame: str
 ) -> None:
-    of_marks: Any = list  # of marks themselves, where a twin has a snapshot
-    arrays: Any = MarkerArrays(of_marks, tag_markers, frame)
-    first = arrays.build(marks[::2])
     plain = MarkerArray(markers=[each for mark in marks for each in tag_markers(mark, frame)])
     expected = deserialize_message(serialize_message(plain), MarkerArray)  # in float32
-    built = arrays.build(marks)
-    assert (built is None) == (marks == marks[::2]), "nothing is another"
-    msg = deserialize_message(built or first, MarkerArray)
+    msg = deserialize_message(marker_array(marks, tag_markers, frame), MarkerArray)
     assert msg.markers[0].action == Marker.DELETEALL
     assert msg.markers[1:] == expected.markers

@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from lupin_twin.ros import services as module
 from lupin_twin.ros.base_node import SERVICE_QOS
 from lupin_twin.ros.services import MAX_ATTEMPT_S, MAX_UNSENT, UNSENT, Responses
-from lupin_twin.runtime.workers import MAX_QUERIES
+from lupin_twin.runtime.workers import MAX_JOBS
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.journal import select
@@ -357,7 +357,7 @@ def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(peer: 
             clients[1].call_async(GetEstimateReport.Request(sensor_type="temperature"))
         )
 
-    for _ in range(MAX_QUERIES + 8):
+    for _ in range(MAX_JOBS + 8):
         query_both()
         peer.spin_briefly()
     peer.observe(messages.scan("in the flood", {"co2": 400.0}, at=(1.0, 1.0)))

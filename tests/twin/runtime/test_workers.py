@@ -1,4 +1,4 @@
-"""The workers, by their clock; and the queue of queries before them."""
+"""The workers, by their clock; and the queue of jobs before them."""
 
 import gc
 import threading
@@ -16,16 +16,13 @@ from hypothesis import strategies as st
 from lupin_twin.core.past import NotRemembered, error_of, message_of
 from lupin_twin.field.idw import Abandoned
 from lupin_twin.runtime.workers import (
-    LARGE_AT_ONCE,
     LARGE_THREADS,
-    MAX_QUERIES,
+    MAX_JOBS,
     PACE_S,
     PATIENCE,
-    SMALL_AT_ONCE,
     SMALL_S,
     TURN_S,
     JobQueue,
-    Query,
     ShouldStop,
     Workers,
     in_turns,
@@ -201,50 +198,57 @@ NOT_SMALL_S = 2 * SMALL_S
 
 
 class Stage:
-    """A queue, and in place of its workers, jobs that end when a test says so."""
+    """A queue on real workers, whose jobs end when a test says so."""
 
     def __init__(self) -> None:
         self.woken = threading.Semaphore(0)
         self.is_behind = False
         self.now_s = 100.0
-        workers: Any = self
         self.queue = JobQueue(
-            workers, self.woken.release, lambda: self.is_behind, lambda: self.now_s
+            "test", self.woken.release, lambda: self.is_behind, lambda: self.now_s, large_threads=1
         )
         self.begun: list[Future[int]] = []
         self.answers: list[Any] = []
 
-    def submit(self, work: Callable[[ShouldStop], Any], _: float) -> Future[int]:
-        job: Future[int] = work(lambda: False)
-        self.begun.append(job)
+    def ask(self, cost_s: float = 0.0) -> Future[int]:
+        job: Future[int] = Future()
+
+        def work(_: ShouldStop) -> int:
+            self.begun.append(job)
+            return job.result(PATIENCE_S)
+
+        self.queue.ask(work, self.answers.append, cost_s)
         return job
 
-    def query(self, cost_s: float = 0.0) -> Future[int]:
-        job: Future[int] = Future()
-        self.queue.ask(Query(lambda _: job, self.answers.append, cost_s))
-        return job
+    def wake(self) -> None:
+        wait_for(lambda: self.woken.acquire(blocking=False), "the owner to be woken")
 
     def delivered(self) -> Any:
         """The next answer; a wake-up brings one at most, and may find none."""
         before = len(self.answers)
         while len(self.answers) == before:
-            wait_for(lambda: self.woken.acquire(blocking=False), "the owner to be woken")
+            self.wake()
             self.queue.deliver()
         assert len(self.answers) == before + 1
         return self.answers[-1]
 
+    def have_begun(self, *jobs: Future[int]) -> None:
+        wait_for(lambda: set(self.begun) == set(jobs), f"{len(jobs)} jobs to begin")
+
 
 @pytest.fixture
-def made() -> Stage:
-    return Stage()
+def made() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.queue.close()
+    for job in stage.begun:
+        job.cancel()
 
 
-def test_a_failing_query_is_answered_and_delays_nobody(made: Stage) -> None:
+def test_a_failing_job_is_answered_and_delays_nobody(made: Stage) -> None:
     error = NotRemembered("no journal")
-    for _ in range(2):
-        made.query(NOT_SMALL_S)
-    for _ in range(2):
-        made.begun[-1].set_exception(error)
+    for job in [made.ask(NOT_SMALL_S) for _ in range(2)]:
+        job.set_exception(error)
         assert made.delivered() is error
     assert made.queue.waiting == 0
 
@@ -253,66 +257,63 @@ def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
     def reply(answer: int) -> None:
         raise RuntimeError(answer)
 
-    done: Future[int] = Future()
-    done.set_result(1)
-    made.queue.ask(Query(lambda _: done, reply, NOT_SMALL_S))
-    after = made.query(cost_s=NOT_SMALL_S)
-    wait_for(lambda: made.woken.acquire(blocking=False), "the owner to be woken")
+    made.queue.ask(lambda _: 1, reply, NOT_SMALL_S)
+    made.wake()
+    after = made.ask(NOT_SMALL_S)
     with pytest.raises(RuntimeError):
         made.queue.deliver()
     after.set_result(2)
     assert made.delivered() == 2
 
 
-def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(made: Stage) -> None:
-    large = [made.query(cost_s=NOT_SMALL_S) for _ in range(LARGE_AT_ONCE + 2)]
-    small = [made.query(cost_s=SMALL_S) for _ in range(SMALL_AT_ONCE + 1)]
-    assert made.begun == [*large[:LARGE_AT_ONCE], *small[:SMALL_AT_ONCE]]
+def test_large_jobs_run_one_at_a_time_and_small_ones_do_not_wait(made: Stage) -> None:
+    large = [made.ask(NOT_SMALL_S) for _ in range(2)]
+    made.have_begun(large[0])
+    small = made.ask(SMALL_S)
+    made.have_begun(large[0], small)
     large[0].set_result(0)
-    wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
-    assert len(made.begun) == LARGE_AT_ONCE + SMALL_AT_ONCE, "before the last is handed out"
+    made.wake()
+    assert made.begun == [large[0], small], "before the last is handed out"
     made.queue.deliver()
-    assert made.begun[-1] is large[LARGE_AT_ONCE]
-    small[0].set_result(1)
+    made.have_begun(*large, small)
+    small.set_result(1)
     assert made.delivered() == 1
-    assert made.begun[-1] is small[-1]
 
 
 @pytest.mark.parametrize("cost_s", [SMALL_S, NOT_SMALL_S])
-def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: float) -> None:
+def test_jobs_wait_for_observations_except_one_a_second(made: Stage, cost_s: float) -> None:
     made.is_behind = True
-    requested = [made.query(cost_s=cost_s) for _ in range(4)]
-    assert made.begun == requested[:1]
-    requested[0].set_result(0)
+    first = made.ask(cost_s)
+    made.have_begun(first)
+    second, third = made.ask(cost_s), made.ask(cost_s)
+    first.set_result(0)
     assert made.delivered() == 0
     made.now_s += PACE_S - 0.01
-    made.queue.go_on()
-    assert made.begun == requested[:1], "one answer is no leave for the next"
+    assert made.begun == [first], "one answer is no leave for the next"
     made.now_s += 0.02
-    made.queue.go_on()
-    assert made.begun == requested[:2]
-    assert made.queue.waiting == 3
+    wait_for(lambda: len(made.begun) == 2, "one more")
+    assert made.queue.waiting == 2
     made.is_behind = False
-    requested[1].set_result(1)
-    assert made.delivered() == 1
-    assert made.begun[:3] == requested[:3], "at once"
+    second.set_result(1)
+    third.set_result(1)
+    assert [made.delivered(), made.delivered()] == [1, 1]
 
 
 @pytest.mark.parametrize("cost_s", [SMALL_S, NOT_SMALL_S])
-def test_the_number_of_waiting_queries_is_limited_and_one_more_has_to_retry(
+def test_the_number_of_waiting_jobs_is_limited_and_one_more_has_to_retry(
     made: Stage, cost_s: float
 ) -> None:
-    searches = [made.query(cost_s=cost_s) for _ in range(MAX_QUERIES)]
-    with pytest.raises(NotRemembered, match=rf"{MAX_QUERIES} requests .* the limit") as refused:
-        made.query(cost_s=cost_s)
+    jobs = [made.ask(cost_s) for _ in range(MAX_JOBS)]
+    with pytest.raises(NotRemembered, match=rf"{MAX_JOBS} requests .* the limit") as refused:
+        made.ask(cost_s)
     assert isinstance(error_of(message_of(refused.value)), NotRemembered)
-    searches[0].set_result(0)
+    jobs[0].set_result(0)
     made.delivered()
-    made.query(cost_s=cost_s)
+    made.ask(cost_s)
 
 
-def test_a_flood_of_large_queries_refuses_no_small_one(made: Stage) -> None:
-    for _ in range(MAX_QUERIES):
-        made.query(cost_s=NOT_SMALL_S)
-    made.query().set_result(7)
+def test_a_flood_of_large_jobs_refuses_no_small_one(made: Stage) -> None:
+    for _ in range(MAX_JOBS):
+        made.ask(NOT_SMALL_S)
+    made.ask().set_result(7)
     assert made.delivered() == 7

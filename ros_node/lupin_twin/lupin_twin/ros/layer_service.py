@@ -35,8 +35,8 @@ from lupin_twin.field.idw import Abandoned
 from lupin_twin.ros.base_node import NO_EVENTS, qos_of
 from lupin_twin.ros.layers import (
     MAX_POINTS,
-    MarkerArrays,
     cloud,
+    marker_array,
     planter_markers,
     planter_marks,
     points,
@@ -46,7 +46,7 @@ from lupin_twin.ros.layers import (
 from lupin_twin.ros.parameters import naming
 from lupin_twin.ros.services import Services, Twin
 from lupin_twin.runtime.estimates import are_enough
-from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
+from lupin_twin.runtime.workers import JobQueue, ShouldStop
 
 # A topic is published no more often than this, s, and only when something has changed.
 PERIOD_S: Final = 1.0
@@ -57,17 +57,20 @@ REST_FACTOR: Final = 9.0
 _COST_S: Final = 1.0
 
 
+# Makes a message in a worker's thread; None: it is as it was.
+Work = Callable[[ShouldStop], bytes | None]
+
+
 @dataclass(slots=True)
 class _Topic:
-    """The topic of a sensor's layer, or of markers.
+    """The topic of a sensor's layer, or of markers; `plan(topic)` returns how to make its message.
 
-    While `key` is the same, so is the message; None: not known before it is made. `estimate_s` is
-    what the estimate of the last message took, s of one core; 0: there was none.
+    While `key` is the same, so is the message. `estimate_s` is what the estimate of the last
+    message took, s of one core; 0: there was none.
     """
 
     publisher: Any
-    sensor: str = ""
-    markers: MarkerArrays | None = None
+    plan: Callable[[_Topic], Work | None]
     key: object = None
     begun_s: float = -math.inf
     estimate_s: float = 0.0
@@ -85,9 +88,8 @@ class LayerService:
 
     def __init__(self, twin: Twin, services: Services, wake: Callable[[], None]) -> None:
         self._twin, self._services = twin, services
-        self._workers = Workers("layers", large_threads=1, small_threads=0)
         self._topics: list[_Topic] = []
-        self.queue = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
+        self.queue = JobQueue("layers", wake, large_threads=1, small_threads=0)
 
     def offer(self) -> None:
         """Create the topics, with names relative to the node's namespace.
@@ -96,18 +98,16 @@ class LayerService:
             ParameterError: a sensor's name is no valid name of a topic.
 
         """
-        of = self._twin.parameters
-        for sensor in dict.fromkeys(of.layers):
+        for sensor in dict.fromkeys(self._twin.parameters.layers):
             with naming("layers", sensor):
                 publisher = self._publisher(PointCloud2, LAYERS_BELOW + sensor, LAYERS)
-            self._topics.append(_Topic(publisher, sensor))
+            self._topics.append(_Topic(publisher, partial(self._plan_layer, sensor)))
         for topic, marks, make in (
             (TAGS, tag_marks, tag_markers),
             (PLANTERS, planter_marks, planter_markers),
         ):
             publisher = self._publisher(MarkerArray, topic.name, topic)
-            markers = MarkerArrays(marks, make, of.frame_id)
-            self._topics.append(_Topic(publisher, markers=markers))
+            self._topics.append(_Topic(publisher, partial(self._plan_markers, marks, make)))
 
     def _publisher(self, kind: Any, name: str, topic: Topic) -> Any:
         return self._twin.utilities.node.create_publisher(
@@ -116,29 +116,25 @@ class LayerService:
 
     def check(self) -> None:
         """Begin messages that are wanted and may have changed; call it regularly."""
-        self.queue.go_on()
         now_s = time.monotonic()
         round_s = sum(topic.estimate_s for topic in self._topics if topic.is_wanted)
         for topic in self._topics:
             topic.is_wanted = topic.publisher.get_subscription_count() > 0
             rest_s = (1.0 + REST_FACTOR) * round_s if topic.estimate_s else 0.0
             is_due = now_s - topic.begun_s >= max(PERIOD_S, rest_s)
-            if topic.is_wanted and not topic.is_under_way and is_due:
+            is_free = not topic.is_under_way and not self._twin.utilities.is_behind
+            if topic.is_wanted and is_free and is_due:
                 self._begin(topic, now_s)
 
     def _begin(self, topic: _Topic, now_s: float) -> None:
-        key = self._key_of_layer(topic) if topic.markers is None else None
-        if self._twin.utilities.is_behind or (key is not None and key == topic.key):
-            return
-        topic.key, topic.begun_s = key, now_s
-        plan = self._plan_layer if topic.markers is None else self._plan_markers
         try:
-            query = plan(topic)
-        except ValueError as error:  # a field that is refused
+            work = topic.plan(topic)
+        except FieldRefused as error:
             self._refuse(topic, error)
             return
-        topic.is_under_way = True
-        self.queue.ask(query)
+        if work is not None:
+            topic.begun_s, topic.is_under_way = now_s, True
+            self.queue.ask(work, partial(self._publish, topic), _COST_S)
 
     def _publish(self, topic: _Topic, made: bytes | Exception | None) -> None:
         """Publish the message that was made; None: it has not changed."""
@@ -165,23 +161,21 @@ class LayerService:
 
     # --- what is made -----------------------------------------------------------------------
 
-    def _key_of_layer(self, topic: _Topic) -> object:
-        twin, occupancy = self._twin, self._twin.occupancy_map
+    def _plan_layer(self, sensor: str, topic: _Topic) -> Work | None:
+        twin, services, snapshot = self._twin, self._services, self._twin.snapshot()
+        occupancy, rules, now_ns = twin.occupancy_map, twin.rules, snapshot.stamp_ns
         revision = None if occupancy is None else occupancy.revision
-        key = twin.store.observation_count, twin.rules, revision
-        if not topic.estimate_s:
-            return key
-        # An estimate changes from minute to minute even if nothing is received: its error grows.
-        day_s = twin.parameters.day_length_s
-        minute_ns = int(day_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
-        return key, twin.memory.condition.written, twin.now_ns() // minute_ns
-
-    def _plan_layer(self, topic: _Topic) -> Query:
-        twin, services, sensor = self._twin, self._services, topic.sensor
-        snapshot, now_ns = twin.snapshot(), twin.now_ns()
+        key: object = twin.store.observation_count, rules, revision
+        if topic.estimate_s:
+            # An estimate changes every minute, even if nothing is received: its error grows.
+            day_s = twin.parameters.day_length_s
+            minute_ns = int(day_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
+            key = key, twin.memory.condition.written, now_ns // minute_ns
+        if key == topic.key:
+            return None
+        topic.key = key
         request = self._request(sensor, snapshot)
         samples = twin.store.samples_for_sensor(sensor)
-        compute = partial(compute_field, request, samples, twin.occupancy_map, twin.rules)
 
         def should_stop() -> bool:
             return not topic.is_wanted
@@ -191,7 +185,7 @@ class LayerService:
             # If the journal cannot be read, the field has no error.
             with suppress(NotRemembered, CancelledError):
                 found = services.readings(sensor, now_ns, should_stop)
-            grid = compute(should_stop)
+            grid = compute_field(request, samples, occupancy, rules, should_stop)
             estimate, topic.estimate_s = None, 0.0
             if are_enough(found):
                 wanted, begun_s = EstimateRequest(request), time.thread_time()
@@ -200,7 +194,7 @@ class LayerService:
                 topic.estimate_s = time.thread_time() - begun_s
             return cloud(points(grid, estimate), snapshot.stamp_ns, snapshot.frame_id)
 
-        return Query(work, partial(self._publish, topic), _COST_S)
+        return work
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The request for a sensor's field; its box, that of all tags, is the same for all."""
@@ -209,11 +203,23 @@ class LayerService:
         box = default_box(places, rules.max_distance_m)
         return default_request(sensor, box, min(rules.max_grid_cells, MAX_POINTS))
 
-    def _plan_markers(self, topic: _Topic) -> Query:
-        # Markers show ages: whether they have changed is known only when they are made.
-        markers, snapshot = topic.markers, self._twin.snapshot()
-        assert markers is not None
-        return Query(lambda _: markers.build(snapshot), partial(self._publish, topic), _COST_S)
+    def _plan_markers(
+        self,
+        marks_of: Callable[[Snapshot], Sequence[Any]],
+        make: Callable[[Any, str], list[Any]],
+        topic: _Topic,
+    ) -> Work:
+        snapshot = self._twin.snapshot()
+
+        def work(_: ShouldStop) -> bytes | None:
+            # Markers show ages: whether they have changed is known only now.
+            marks = marks_of(snapshot)
+            if marks == topic.key:
+                return None
+            topic.key = marks
+            return marker_array(marks, make, snapshot.frame_id)
+
+        return work
 
     # --- the node's -------------------------------------------------------------------------
 
@@ -235,4 +241,4 @@ class LayerService:
         """End the thread; its current work is abandoned."""
         for topic in self._topics:
             topic.is_wanted = False
-        self._workers.close()
+        self.queue.close()

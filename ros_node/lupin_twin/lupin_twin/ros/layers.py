@@ -215,33 +215,15 @@ def _marker(
     )
 
 
-class MarkerArrays:
-    """Builds visualization_msgs/MarkerArray of one kind of marks, when they have changed.
+def marker_array(
+    marks: Sequence[Any], make: Callable[[Any, str], list[Any]], frame_id: str
+) -> bytes:
+    """A serialised visualization_msgs/MarkerArray; `make(mark, frame_id)` gives a mark's markers.
 
-    An array is complete: its first marker deletes all earlier ones, so that nothing outdated stays
-    in a viewer, not even from an earlier twin. Belongs to one thread at a time.
+    It is complete: its first marker deletes all earlier ones, so that nothing outdated stays in a
+    viewer, not even from an earlier twin. It lets other threads run meanwhile.
     """
-
-    def __init__(
-        self,
-        marks: Callable[[Snapshot], Sequence[Any]],
-        make: Callable[[Any, str], list[Any]],
-        frame_id: str,
-    ) -> None:
-        """`make(mark, frame_id)` gives the markers of one of the `marks(snapshot)`."""
-        self._marks = marks
-        self._make = make
-        self._frame_id = frame_id
-        self._before: Sequence[Any] | None = None
-
-    def build(self, snapshot: Snapshot) -> bytes | None:
-        """The serialised array, or None if it has not changed; lets other threads run meanwhile."""
-        marks = self._marks(snapshot)
-        if marks == self._before:
-            return None
-        self._before = marks
-        header = Header(frame_id=self._frame_id)
-        markers = [Marker(header=header, action=Marker.DELETEALL)]
-        for mark in in_turns(marks):
-            markers += self._make(mark, self._frame_id)
-        return bytes(serialize_message(MarkerArray(markers=markers)))
+    markers = [Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)]
+    for mark in in_turns(marks):
+        markers += make(mark, frame_id)
+    return bytes(serialize_message(MarkerArray(markers=markers)))

@@ -305,7 +305,6 @@ class TwinNode(AdjustableNode):
             self._listener(self.snapshot())
 
     def _check_clock(self) -> None:
-        self._twin_services.go_on()
         before = self._clock_watch.state
         self.now_ns()
         if self._clock_watch.state != before:

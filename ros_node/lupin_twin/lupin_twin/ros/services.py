@@ -73,14 +73,7 @@ from lupin_twin.runtime.estimates import (
     report_of,
 )
 from lupin_twin.runtime.memory import Memory
-from lupin_twin.runtime.workers import (
-    LARGE_THREADS,
-    SMALL_S,
-    JobQueue,
-    Query,
-    ShouldStop,
-    Workers,
-)
+from lupin_twin.runtime.workers import SMALL_S, JobQueue, ShouldStop
 
 Report = Callable[[str, Exception], None]
 Reply = Callable[[Any], None]
@@ -118,9 +111,8 @@ class Services:
     def __init__(self, twin: Twin, wake: Callable[[], None]) -> None:
         self._twin = twin
         # Apart, because threads that read the journal may wait for a disk that hangs.
-        self._workers = Workers("field"), Workers("past")
-        self.fields = JobQueue(self._workers[0], wake, large_at_once=LARGE_THREADS)
-        self._past = JobQueue(self._workers[1], wake, lambda: twin.utilities.is_behind)
+        self.fields = JobQueue("field", wake)
+        self._past = JobQueue("past", wake, lambda: twin.utilities.is_behind, large_threads=1)
         self._cache = FieldCache(twin.parameters.field_cache_mb * 1e6)
 
     def offer(self, group: Any) -> None:
@@ -132,18 +124,18 @@ class Services:
         """
         name = self._twin.parameters.field_service_name
         with naming("field_service_name", name):
-            for kind, service, plan, queue in (
-                (GetField, name, self._field, self.fields),
-                (GetEstimate, GET_ESTIMATE.name, self._estimate, self._past),
-                (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._report, self._past),
-                (GetStateAt, GET_STATE_AT.name, self._state_at, self._past),
-                (GetHistory, GET_HISTORY.name, self._history, self._past),
-                (GetWrites, GET_WRITES.name, self._writes, self._past),
+            for kind, service, begin in (
+                (GetField, name, self._field),
+                (GetEstimate, GET_ESTIMATE.name, self._estimate),
+                (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._report),
+                (GetStateAt, GET_STATE_AT.name, self._state_at),
+                (GetHistory, GET_HISTORY.name, self._history),
+                (GetWrites, GET_WRITES.name, self._writes),
             ):
                 self._twin.utilities.node.create_service(
                     kind,
                     service,
-                    partial(self._answer, kind, plan, queue),
+                    partial(self._answer, kind, begin),
                     qos_profile=SERVICE_QOS,
                     callback_group=group,
                 )
@@ -153,39 +145,29 @@ class Services:
         self.fields.deliver()
         self._past.deliver()
 
-    def go_on(self) -> None:
-        """Begin the requests that may begin by now; to be called now and then."""
-        self._past.go_on()
-
     def close(self) -> None:
         """End the workers; their current work is abandoned."""
-        for workers in self._workers:
-            workers.close()
+        self.fields.close()
+        self._past.close()
 
     def _answer(
-        self,
-        kind: Any,
-        plan: Callable[[Any, Reply], Query | None],
-        queue: JobQueue,
-        request: Any,
-        _: Any,
-    ) -> Any:
-        """Return a response, or its future; `plan` returns None if it has replied already."""
+        self, kind: Any, begin: Callable[[Any, Reply], None], request: Any, _: Any
+    ) -> Future[Any]:
+        """Return the future of a response; `begin(request, reply)` has it made."""
         later: Future[Any] = Future()
-        report = self._twin.utilities.report
 
         def reply(found: Any) -> None:
             is_error = isinstance(found, Exception)
+            report = self._twin.utilities.report
             later.set_result(refusal(kind, found, report) if is_error else found)
 
         try:
-            if (query := plan(request, reply)) is not None:
-                queue.ask(query)
+            begin(request, reply)
         except Exception as error:  # noqa: BLE001  # no client may wait forever
-            return refusal(kind, error, report)
+            reply(error)
         return later
 
-    def _field(self, request: Any, reply: Reply) -> Query | None:
+    def _field(self, request: Any, reply: Reply) -> None:
         twin, wanted = self._twin, convert_services.field_request_of(request)
         rules, occupancy = twin.rules, twin.occupancy_map
         check_request(wanted, rules.max_grid_cells)
@@ -195,7 +177,7 @@ class Services:
         key = wanted, twin.store.observation_count, revision, rules
         if (found := self._cache.get(key)) is not None:
             reply(convert_services.field_response(found))
-            return None
+            return
         samples = twin.store.samples_for_sensor(wanted.sensor_type)
         compute = partial(compute_field, wanted, samples, occupancy, rules)
         cost = cost_s(wanted, len(samples), rules)
@@ -206,29 +188,29 @@ class Services:
                 grid = convert_services.field_response(grid)
             reply(grid)
 
-        return Query(compute, keep, cost)
+        self.fields.ask(compute, keep, cost)
 
     # --- the past: its size is estimated from the current state ---------------------------------
 
-    def _state_at(self, request: Any, reply: Reply) -> Query:
+    def _state_at(self, request: Any, reply: Reply) -> None:
         at_ns, frame_id = convert.nanoseconds(request.at), self._twin.parameters.frame_id
         check_moment(at_ns, self._twin.now_ns())
         tags, items = self._twin.store.size
         cost = tags * (STATE_S_PER_TAG + convert_services.TAG_S) + items * convert_services.ITEM_S
         make = convert_services.state_response
-        return self._of_log(lambda log: state_at(log, at_ns, frame_id), make, reply, cost)
+        self._of_log(lambda log: state_at(log, at_ns, frame_id), make, reply, cost)
 
-    def _history(self, request: Any, reply: Reply) -> Query:
+    def _history(self, request: Any, reply: Reply) -> None:
         query, now_ns = convert_services.series_request(request), self._twin.now_ns()
         cost = EVERY_TAG_S if query.tag_id == EVERY_TAG else SMALL_S
         make = convert_services.series_response
-        return self._of_log(lambda log: series(log, query, now_ns), make, reply, cost)
+        self._of_log(lambda log: series(log, query, now_ns), make, reply, cost)
 
-    def _writes(self, request: Any, reply: Reply) -> Query:
+    def _writes(self, request: Any, reply: Reply) -> None:
         after = min(int(request.after), FOREVER_NS)
         # A copy must not wait for estimates, so this counts as small.
         make = convert_services.rows_response
-        return self._of_log(lambda log: follow.read(log, after), make, reply, SMALL_S)
+        self._of_log(lambda log: follow.read(log, after), make, reply, SMALL_S)
 
     def _of_log(
         self,
@@ -236,9 +218,9 @@ class Services:
         make: Callable[[Any], Any],
         reply: Reply,
         cost: float,
-    ) -> Query:
-        """The query for a response that `make` makes of what is found in the journal."""
-        return Query(lambda stop: make(self._search(search, stop)), reply, cost)
+    ) -> None:
+        """Have `make` make the response of what is found in the journal."""
+        self._past.ask(lambda stop: make(self._search(search, stop)), reply, cost)
 
     def _search(self, search: Callable[[sqlite3.Connection], Any], stop: ShouldStop) -> Any:
         return self._twin.memory.recall.answer(lambda log, _: search(log), stop)
@@ -267,7 +249,7 @@ class Services:
         at_ns = request.at_ns or moment_of(found, now_ns, day_s)
         return estimate_at(replace(request, at_ns=at_ns), found, day_s, should_stop)
 
-    def _estimate(self, request: Any, reply: Reply) -> Query:
+    def _estimate(self, request: Any, reply: Reply) -> None:
         twin, wanted = self._twin, convert_services.estimate_request_of(request)
         now_ns = twin.now_ns()
         check_moment(wanted.at_ns, now_ns)
@@ -279,9 +261,9 @@ class Services:
             return convert_services.response_of(self.estimate(wanted, now_ns, found, stop))
 
         cost = AS_OF * engine.cost_s(wanted, tags, twin.parameters.max_grid_cells)
-        return Query(work, reply, self._readings_s(1.0) + cost)
+        self._past.ask(work, reply, self._readings_s(1.0) + cost)
 
-    def _report(self, request: Any, reply: Reply) -> Query:
+    def _report(self, request: Any, reply: Reply) -> None:
         wanted, now_ns = convert_services.report_request_of(request), self._twin.now_ns()
         day_s, occupancy = self._twin.parameters.day_length_s, self._twin.occupancy_map
 
@@ -290,7 +272,7 @@ class Services:
             report = report_of(wanted, found, now_ns, day_s, occupancy=occupancy, should_stop=stop)
             return convert_services.report_response(report)
 
-        return Query(work, reply, self._readings_s(REPORT_DAYS) + REPORT_S)
+        self._past.ask(work, reply, self._readings_s(REPORT_DAYS) + REPORT_S)
 
     def _readings_s(self, days: float) -> float:
         """Approximate cost of readings, s of one core."""

@@ -17,9 +17,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass, field
 from functools import partial
-from queue import Empty, SimpleQueue
 from typing import Any, Final, Generic, TypeVar
 
 from lupin_twin.core.past import NotRemembered
@@ -192,133 +190,111 @@ def in_turns(
             begun_s = clock()
 
 
-# Limits of small, and of large, queries: those without an answer, and those processed at once.
-MAX_QUERIES: Final = 32
-LARGE_AT_ONCE: Final = 1
-SMALL_AT_ONCE: Final = 4
-# Time between two small, or two large, queries while the owner's thread is behind, s.
+# Small, and large, jobs of a queue that have no answer yet, at most.
+MAX_JOBS: Final = 32
+# Time between two small, or two large, jobs while the owner's thread is behind, s.
 PACE_S: Final = 1.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Query:
-    """What to do on a worker, and who gets the answer.
-
-    `work(should_stop)` makes the answer; `cost_s` is its estimated cost, s of one core. `reply`
-    gets the answer, or the exception. `since_s` is when it was made, steady clock.
-    """
-
-    work: Callable[[ShouldStop], Any]
-    reply: Callable[[Any], None]
-    cost_s: float = 0.0
-    since_s: float = field(default_factory=time.monotonic)
+# How often a worker checks whether the owner's thread is still behind, s.
+_CHECK_S: Final = 0.05
 
 
 class JobQueue:
-    """Queries of one thread, which owns the queue, gets the answers, and is not blocked by them.
+    """Jobs of one thread, which owns the queue, gets the answers, and is not blocked by them.
 
-    At most `large_at_once` large queries are processed until their answers are delivered, because
-    the largest takes about 200 MB. Small ones do not wait behind them, nor are refused because of
-    them. While `is_behind()` (messages wait for the owner's thread), queries wait too, except for
-    one a second. `wake()` is called in another thread when `deliver` has something to do. `clock`
-    returns seconds and never jumps. `answered` counts answers, `slowest_s` is the longest that one
-    took.
+    A worker begins a job only when every answer was delivered, because the largest takes about
+    200 MB. While `is_behind()` (messages wait for the owner's thread), one job a second begins.
+    `wake()` is called in another thread when `deliver` has something to do. `clock` returns seconds
+    and never jumps; the other arguments are those of `Workers`. `answered` counts answers,
+    `slowest_s` is the longest that one took.
     """
 
     def __init__(
         self,
-        workers: Workers,
+        name: str,
         wake: Callable[[], None],
         is_behind: Callable[[], bool] = lambda: False,
         clock: Callable[[], float] = time.monotonic,
-        large_at_once: int = LARGE_AT_ONCE,
+        *,
+        large_threads: int = LARGE_THREADS,
+        small_threads: int = SMALL_THREADS,
     ) -> None:
         self.answered = 0
         self.slowest_s = 0.0
-        self._workers = workers
+        self._workers = Workers(name, large_threads=large_threads, small_threads=small_threads)
         self._wake = wake
         self._is_behind = is_behind
         self._clock = clock
-        self._lanes = (_Lane(SMALL_AT_ONCE), _Lane(large_at_once))
-        self._done: SimpleQueue[tuple[Query, Any]] = SimpleQueue()
+        self._changed = threading.Condition()
+        # Of small jobs, and of large ones: those without an answer, and when the last was begun.
+        self._open = [0, 0]
+        self._begun_s = [-math.inf, -math.inf]
+        self._done: deque[Callable[[], None]] = deque()
 
     @property
     def waiting(self) -> int:
-        """Queries whose answer has not been delivered yet."""
-        return sum(lane.count for lane in self._lanes)
+        """Jobs whose answer has not been delivered yet."""
+        return sum(self._open)
 
-    def ask(self, query: Query) -> None:
-        """Queue a query, to be answered by `deliver`.
+    def ask(
+        self,
+        work: Callable[[ShouldStop], Any],
+        reply: Callable[[Any], None],
+        cost_s: float = 0.0,
+    ) -> None:
+        """Have `deliver` call `reply` with what `work(should_stop)` returns or raises.
 
         Raises:
-            NotRemembered: too many small, or large, queries wait.
+            NotRemembered: too many small, or large, jobs wait.
 
         """
-        lane = self._lane(query)
-        if lane.count >= MAX_QUERIES:
-            raise NotRemembered(f"{MAX_QUERIES} requests wait, which is the limit")
-        lane.waiting.append(query)
-        self._begin(lane)
+        is_large, since_s = cost_s > SMALL_S, self._clock()
+        if self._open[is_large] >= MAX_JOBS:
+            raise NotRemembered(f"{MAX_JOBS} requests wait, which is the limit")
+        self._open[is_large] += 1
 
-    def go_on(self) -> None:
-        """Begin the queries that may begin by now; to be called now and then."""
-        for lane in self._lanes:
-            self._begin(lane)
+        def deliver(answer: Any) -> None:
+            self._open[is_large] -= 1
+            if not isinstance(answer, Exception):
+                self.answered += 1
+                self.slowest_s = max(self.slowest_s, self._clock() - since_s)
+            reply(answer)
+
+        def run(should_stop: ShouldStop) -> None:
+            self._wait(is_large, should_stop)
+            try:
+                answer = work(should_stop)
+            except Exception as error:  # noqa: BLE001  # handed to whoever waits
+                answer = error
+            self._done.append(partial(deliver, answer))
+            self._wake()
+
+        self._workers.submit(run, cost_s)
 
     def deliver(self) -> None:
         """Deliver one answer; if there are more, `wake` is called for the next.
 
         Sending a large one takes a while, so other callbacks of this thread run in between.
         """
-        try:
-            query, answer = self._done.get_nowait()
-        except Empty:
+        if not self._done:
             return
-        if not self._done.empty():
-            self._wake()
-        if not isinstance(answer, Exception):
-            self.answered += 1
-            self.slowest_s = max(self.slowest_s, time.monotonic() - query.since_s)
         try:
-            query.reply(answer)
+            self._done[0]()
         finally:
-            lane = self._lane(query)
-            lane.under_way -= 1
-            self._begin(lane)
+            with self._changed:
+                self._done.popleft()
+                self._changed.notify_all()
+            if self._done:
+                self._wake()
 
-    def _lane(self, query: Query) -> _Lane:
-        return self._lanes[query.cost_s > SMALL_S]
+    def close(self) -> None:
+        """End the threads; their current work is abandoned."""
+        self._workers.close()
 
-    def _begin(self, lane: _Lane) -> None:
-        while lane.waiting and lane.under_way < lane.at_once:
-            now_s = self._clock()
-            if self._is_behind() and now_s - lane.begun_s < PACE_S:
-                return
-            query = lane.waiting.popleft()
-            lane.begun_s = now_s
-            lane.under_way += 1
-            job = self._workers.submit(query.work, query.cost_s)
-            job.add_done_callback(partial(self._put, query))
-
-    def _put(self, query: Query, job: Future[Any]) -> None:
-        try:
-            answer = job.result()
-        except Exception as error:  # noqa: BLE001  # handed to whoever waits
-            answer = error
-        self._done.put((query, answer))
-        self._wake()
-
-
-@dataclass(slots=True)
-class _Lane:
-    """Small or large queries, how many are processed at once, and when the last was begun."""
-
-    at_once: int
-    under_way: int = 0
-    begun_s: float = -math.inf
-    waiting: deque[Query] = field(default_factory=deque)
-
-    @property
-    def count(self) -> int:
-        """Queries whose answer has not been delivered yet."""
-        return len(self.waiting) + self.under_way
+    def _wait(self, is_large: bool, should_stop: ShouldStop) -> None:
+        with self._changed:
+            while not should_stop() and (
+                self._done
+                or (self._is_behind() and self._clock() - self._begun_s[is_large] < PACE_S)
+            ):
+                self._changed.wait(_CHECK_S)
+            self._begun_s[is_large] = self._clock()

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, Final, NamedTuple
 
@@ -33,7 +33,6 @@ from lupin_twin.core.drops import (
 # The two encapsulations of plain CDR, and how a uint32 is read in each.
 _LENGTHS: Final = {b"\x00\x00": struct.Struct(">I"), b"\x00\x01": struct.Struct("<I")}
 _HEADER_BYTES: Final = 4
-_ALIGNMENTS: Final = 8
 
 _SIZES: Final = {
     **dict.fromkeys(("boolean", "octet", "byte", "char", "int8", "uint8"), 1),
@@ -53,40 +52,75 @@ class TooManyError(MalformedError):
     """The message exceeds one of our limits; says which, and by how much."""
 
 
-class _Reader:
-    """A message that is being walked: its bytes, and how many elements it may still claim."""
+class _Numbers(NamedTuple):
+    """Numbers of one size, in bytes, one after the other."""
 
-    __slots__ = ("data", "elements_left", "end", "length_at")
+    size: int
+    number: int
+
+
+class _Text(NamedTuple):
+    path: str
+
+
+class _Sequence(NamedTuple):
+    """A sequence of elements with these parts, each of at least `min_bytes`."""
+
+    path: str
+    element: list[_Numbers | _Text | _Sequence]
+    min_bytes: int
+    limit: int | None
+
+
+_Part = _Numbers | _Text | _Sequence
+
+
+class _Walk:
+    """A walk over a message's bytes; `elements_left` is how many it may still claim."""
 
     def __init__(self, data: bytes, max_elements: int) -> None:
         length = _LENGTHS.get(bytes(data[:2]))
         if length is None or len(data) < _HEADER_BYTES:
             raise MalformedError(f"its first bytes are {bytes(data[:4]).hex()!r}, not plain CDR's")
-        self.data = data
-        self.end = len(data)
-        self.length_at = length.unpack_from
-        self.elements_left = max_elements
+        self._data, self._end = data, len(data)
+        self._length_at = length.unpack_from
+        self._elements_left = max_elements
 
-    def length(self, at: int, what: str) -> int:
-        if at + 4 > self.end:
-            raise MalformedError(f"it ends within the length of {what}")
-        return int(self.length_at(self.data, at)[0])
+    def over(self, parts: list[_Part], at: int) -> int:
+        """Walk over parts that begin at `at`; returns where they end, maybe after the last byte."""
+        for part in parts:
+            if isinstance(part, _Numbers):
+                # Aligned from the end of the header.
+                at += (_HEADER_BYTES - at) % part.size + part.size * part.number
+                continue
+            at += -at % 4 + 4
+            if at > self._end:
+                raise MalformedError(f"it ends within the length of {part.path}")
+            count, left = int(self._length_at(self._data, at - 4)[0]), self._end - at
+            if isinstance(part, _Sequence):
+                at = self._over_sequence(part, count, at)
+            elif count > left:
+                raise MalformedError(f"{part.path} claims {count} bytes, {left} bytes are left")
+            else:
+                at += count
+        return at
 
-
-# Takes a reader and where a value begins; returns where the next one does.
-_Walk = Callable[[_Reader, int], int]
-
-
-class _Part(NamedTuple):
-    """How to walk over a value, and its least size in bytes.
-
-    `steps`, for a value of fixed size, is its size in bytes with padding, by the offset (modulo 8)
-    at which it begins.
-    """
-
-    walk: _Walk
-    min_bytes: int
-    steps: tuple[int, ...] | None = None
+    def _over_sequence(self, part: _Sequence, count: int, at: int) -> int:
+        if part.limit is not None and count > part.limit:
+            raise TooManyError(f"{part.path}: {count}, the limit is {part.limit}")
+        if count * part.min_bytes > self._end - at:
+            raise MalformedError(
+                f"{part.path}: {count} of at least {part.min_bytes} bytes are claimed, "
+                f"{self._end - at} bytes are left"
+            )
+        if isinstance(part.element[0], _Numbers) and part.element[0].size == part.min_bytes:
+            return self.over([_Numbers(part.min_bytes, count)], at) if count else at
+        self._elements_left -= count
+        if self._elements_left < 0:
+            raise TooManyError(f"{part.path}: more elements in all sequences than the limit")
+        for _ in range(count):
+            at = self.over(part.element, at)
+        return at
 
 
 class MessageShape:
@@ -115,7 +149,7 @@ class MessageShape:
         self.max_bytes = max_bytes
         self._limits = dict(limits or {})
         self._max_elements = max_elements
-        self._walk = self._message(message_type, "").walk
+        self._parts = self._message(message_type, "")
         if self._limits:
             raise TypeError(f"{message_type.__name__} has no sequences {sorted(self._limits)}")
 
@@ -129,109 +163,42 @@ class MessageShape:
         """
         if len(data) > self.max_bytes:
             raise TooManyError(f"{len(data)} bytes, the limit is {self.max_bytes}")
-        reader = _Reader(data, self._max_elements)
-        end = self._walk(reader, _HEADER_BYTES)
-        if end > reader.end:
-            raise MalformedError(f"it has {reader.end} bytes, its fields need {end}")
+        end = _Walk(data, self._max_elements).over(self._parts, _HEADER_BYTES)
+        if end > len(data):
+            raise MalformedError(f"it has {len(data)} bytes, its fields need {end}")
         return end
 
-    def _message(self, message_type: Any, path: str) -> _Part:
-        fields = message_type.get_fields_and_field_types()
-        return _in_a_row(
-            [self._field(kind, f"{path}.{name}" if path else name) for name, kind in fields.items()]
-        )
+    def _message(self, message_type: Any, path: str) -> list[_Part]:
+        """The parts of a message and of those in it, in order; numbers of one size become one."""
+        parts: list[_Part] = []
+        for name, kind in message_type.get_fields_and_field_types().items():
+            for part in self._field(kind, f"{path}.{name}" if path else name):
+                last = parts[-1] if parts else None
+                if (
+                    isinstance(part, _Numbers)
+                    and isinstance(last, _Numbers)
+                    and part.size == last.size
+                ):
+                    parts[-1] = _Numbers(part.size, last.number + part.number)
+                else:
+                    parts.append(part)
+        return parts
 
-    def _field(self, kind: str, path: str) -> _Part:
+    def _field(self, kind: str, path: str) -> list[_Part]:
         if kind in _SIZES:
-            return _fixed(_SIZES[kind], 1)
+            return [_Numbers(_SIZES[kind], 1)]
         if kind == "string":
-            return _text(path)
+            return [_Text(path)]
         if sequence := _SEQUENCE.fullmatch(kind):
-            limit, element = self._limits.pop(path, None), sequence["element"]
-            return _sequence(path, self._field(element, path), limit, element not in _SIZES)
+            limit, element = self._limits.pop(path, None), self._field(sequence["element"], path)
+            sizes = (
+                part.size * part.number if isinstance(part, _Numbers) else 4 for part in element
+            )
+            return [_Sequence(path, element, sum(sizes), limit)]
         if array := _ARRAY.fullmatch(kind):
-            return _fixed(_SIZES[array["number"]], int(array["count"]))
+            return [_Numbers(_SIZES[array["number"]], int(array["count"]))]
         package, _, name = kind.partition("/")
         return self._message(getattr(import_module(f"{package}.msg"), name), path)
-
-
-def _fixed(size: int, count: int) -> _Part:
-    """`count` numbers of `size` bytes, one after the other."""
-    # Aligned from the end of the header, which has half the size of the largest number.
-    return _of_steps(
-        tuple((_HEADER_BYTES - begin) % size + size * count for begin in range(_ALIGNMENTS)),
-        size * count,
-    )
-
-
-def _of_steps(steps: tuple[int, ...], min_bytes: int) -> _Part:
-    return _Part(lambda _, at: at + steps[at % _ALIGNMENTS], min_bytes, steps)
-
-
-def _in_a_row(parts: Sequence[_Part]) -> _Part:
-    """Parts one after the other; adjacent ones of fixed size become one step."""
-    merged: list[_Part] = []
-    for part in parts:
-        last = merged[-1] if merged else None
-        if last is not None and last.steps is not None and part.steps is not None:
-            steps = tuple(
-                step + part.steps[(begin + step) % _ALIGNMENTS]
-                for begin, step in enumerate(last.steps)
-            )
-            merged[-1] = _of_steps(steps, last.min_bytes + part.min_bytes)
-        else:
-            merged.append(part)
-    if len(merged) == 1:
-        return merged[0]
-    walks = tuple(part.walk for part in merged)
-
-    def walk(reader: _Reader, at: int) -> int:
-        for one in walks:
-            at = one(reader, at)
-        return at
-
-    return _Part(walk, sum(part.min_bytes for part in merged))
-
-
-def _text(path: str) -> _Part:
-    def walk(reader: _Reader, at: int) -> int:
-        at += -at % 4
-        length = reader.length(at, path)
-        at += 4 + length
-        if at > reader.end:
-            left = reader.end - at + length
-            raise MalformedError(f"{path} claims {length} bytes, {left} bytes are left")
-        return at
-
-    return _Part(walk, 4)
-
-
-def _sequence(path: str, element: _Part, limit: int | None, is_counted: bool) -> _Part:
-    min_bytes, walk_element = element.min_bytes, element.walk
-
-    def walk(reader: _Reader, at: int) -> int:
-        at += -at % 4
-        count = reader.length(at, path)
-        at += 4
-        if limit is not None and count > limit:
-            raise TooManyError(f"{path}: {count}, the limit is {limit}")
-        if count * min_bytes > reader.end - at:
-            raise MalformedError(
-                f"{path}: {count} of at least {min_bytes} bytes are claimed, "
-                f"{reader.end - at} bytes are left"
-            )
-        if is_counted:
-            reader.elements_left -= count
-            if reader.elements_left < 0:
-                raise TooManyError(f"{path}: more elements in all sequences than the limit")
-        if not is_counted:  # plain numbers, aligned to their own size
-            padding = (_HEADER_BYTES - at) % min_bytes if count else 0
-            return at + padding + count * min_bytes
-        for _ in range(count):
-            at = walk_element(reader, at)
-        return at
-
-    return _Part(walk, 4)
 
 
 MAX_STATUSES: Final = 1_000

@@ -196,7 +196,7 @@ def test_a_complete_map_has_tables_and_walls_and_otherwise_free_floor() -> None:
             x = grid.origin[0] + (column + 0.5) * RESOLUTION_M
             y = grid.origin[1] + (row + 0.5) * RESOLUTION_M
             is_floor = greenhouse.interior.contains((x, y)) and not any(
-                table.rect.contains((x, y)) for table in greenhouse.tables
+                table.contains((x, y)) for table in greenhouse.tables
             )
             assert cell(grid, (x, y)) == (FREE if is_floor else OCCUPIED), (x, y)
 
@@ -243,7 +243,7 @@ def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: 
             assert look.blooms
             assert look.flower_count == len(look.blooms)
             for bloom in look.blooms:
-                assert tag.table.rect.contains((bloom.x, bloom.y))
+                assert tag.table.contains((bloom.x, bloom.y))
                 assert bloom.species == look.species == plants.species(tag.tag_id)
                 assert 0.1 < bloom.height_m < 0.4
                 assert bloom.z == TABLE_HEIGHT_M + bloom.height_m

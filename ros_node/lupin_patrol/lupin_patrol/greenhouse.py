@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from math import atan2, dist
 from pathlib import Path
 from typing import Any
@@ -28,12 +28,13 @@ TOUCH_M = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Rect:
-    """Axis-aligned rectangle, x0 < x1 and y0 < y1, metres."""
+    """Axis-aligned rectangle, x0 < x1 and y0 < y1, metres. A table has a name."""
 
     x0: float
     y0: float
     x1: float
     y1: float
+    name: str = ""
 
     def grown(self, margin_m: float) -> Rect:
         """Return the rectangle widened by a margin on every side; a negative one shrinks it."""
@@ -95,22 +96,13 @@ def walk(points: Sequence[Point], step_m: float) -> Iterator[tuple[Point, float]
 
     The last one is the polyline's end.
     """
-    remaining = length_of(points)
-    position, ahead = points[0], list(points[1:])
+    along_m = [0.0, *accumulate(dist(a, b) for a, b in pairwise(points))]
+    at_m = 0.0
     while True:
-        wanted = covered = min(step_m, max(remaining, 0.0))
-        while ahead and wanted >= dist(position, ahead[0]):
-            wanted -= dist(position, ahead[0])
-            position = ahead.pop(0)
-        if ahead and wanted > 0.0:
-            part = wanted / dist(position, ahead[0])
-            position = (
-                position[0] + part * (ahead[0][0] - position[0]),
-                position[1] + part * (ahead[0][1] - position[1]),
-            )
-        remaining -= covered
-        yield position, covered
-        if remaining <= TOUCH_M:
+        before_m, at_m = at_m, min(at_m + step_m, along_m[-1])
+        x, y = (float(np.interp(at_m, along_m, axis)) for axis in zip(*points, strict=True))
+        yield (x, y), at_m - before_m
+        if along_m[-1] - at_m <= TOUCH_M:
             return
 
 
@@ -127,14 +119,6 @@ TAG_HEIGHT_M = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
-    """A planter: a table that is one box of plants."""
-
-    name: str
-    rect: Rect
-
-
-@dataclass(frozen=True, slots=True)
 class Tag:
     """An AprilTag with its climate sensors.
 
@@ -145,7 +129,7 @@ class Tag:
     tag_id: str
     position: Point
     sensors: tuple[str, ...]
-    table: Table
+    table: Rect
     edge: Point
     facing: Point
     stop: Point
@@ -161,14 +145,14 @@ class Greenhouse:
     """The static layout: interior, tables and tags."""
 
     interior: Rect
-    tables: tuple[Table, ...]
+    tables: tuple[Rect, ...]
     tags: tuple[Tag, ...]
 
     def is_free(self, point: Point) -> bool:
         """Whether the robot's centre may be there."""
         floor = self.interior.grown(TOUCH_M - CLEARANCE_M)
         return floor.nearest(point) == point and not any(
-            table.rect.grown(CLEARANCE_M).contains(point) for table in self.tables
+            table.grown(CLEARANCE_M).contains(point) for table in self.tables
         )
 
 
@@ -182,7 +166,7 @@ def read_greenhouse(simulator: Any) -> Greenhouse:
     # The simulator's tag manager drops the tables when it loads this file.
     layout = json.loads(Path(simulator.tag_manager.file_path).read_text(encoding="utf-8"))
     tables = tuple(
-        Table(name, Rect(float(box["x0"]), float(box["y0"]), float(box["x1"]), float(box["y1"])))
+        Rect(float(box["x0"]), float(box["y0"]), float(box["x1"]), float(box["y1"]), name)
         for name, box in layout["tables"].items()
     )
     greenhouse = Greenhouse(interior, tables, ())
@@ -195,9 +179,9 @@ def read_greenhouse(simulator: Any) -> Greenhouse:
 
 def _place_tag(tag_id: str, position: Point, sensors: list[str], greenhouse: Greenhouse) -> Tag:
     """Put a tag on the nearest side of its table; at a corner, on the side with the wider aisle."""
-    table = min(greenhouse.tables, key=lambda it: dist(position, it.rect.nearest(position)))
+    table = min(greenhouse.tables, key=lambda it: dist(position, it.nearest(position)))
     sides = []
-    for order, (edge, facing) in enumerate(_sides(table.rect, position)):
+    for order, (edge, facing) in enumerate(_sides(table, position)):
         for stand_off_m in STAND_OFFS_M:
             stop = (edge[0] + facing[0] * stand_off_m, edge[1] + facing[1] * stand_off_m)
             if greenhouse.is_free(stop):
@@ -228,7 +212,7 @@ class Roadmap:
     """Shortest paths between any two free points of a greenhouse."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
-        self._obstacles = [table.rect.grown(CLEARANCE_M) for table in greenhouse.tables]
+        self._obstacles = [table.grown(CLEARANCE_M) for table in greenhouse.tables]
         self._corners = np.array(
             [
                 corner

@@ -18,7 +18,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
-from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
+from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid, Path
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -36,10 +36,11 @@ from lupin_patrol.mission import (
     WayPlanned,
     pose_of,
 )
+from lupin_patrol.perception import Grid
 from lupin_twin.core import interfaces
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.ros.base_node import NodeUtilities, latched, running_ros, spinning
-from lupin_twin.ros.convert import nanoseconds, observation_message, pose_message
+from lupin_twin.ros.convert import discovered_tags_message, nanoseconds, observation_message
 from lupin_twin.ros.parameters import declare, naming, naming_own_parameters
 from lupin_twin.runtime import process
 
@@ -80,24 +81,30 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def publish(self, event: Event) -> None:
         """Publish an event, stamped with the current ROS time."""
-        stamp = self.get_clock().now().to_msg()
+        header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._frame_id)
         match event:
             case MapGrown():
-                self._map.publish(occupancy_grid(event, stamp, self._frame_id))
+                self._map.publish(occupancy_grid(event.grid, header))
             case TagsDiscovered():
-                self._discovered_tags.publish(discovered_tags(event, stamp, self._frame_id))
+                places = {tag.tag_id: pose_of(tag.position, tag.yaw) for tag in event.tags}
+                self._discovered_tags.publish(discovered_tags_message(places, header))
             case Visited():
-                self.observations.publish(observation(event, nanoseconds(stamp), self._frame_id))
+                stamp_ns = nanoseconds(header.stamp)
+                self.observations.publish(observation(event, stamp_ns, self._frame_id))
                 if event.write.status != STATUS_OK:
                     self.get_logger().info(
                         f"tag {event.write.tag_id}: {ScanStatus(event.write.status).name},"
                         f" {event.write.status_detail}"
                     )
             case WayPlanned():
-                self._plan.publish(path(event, stamp, self._frame_id))
+                poses = [PoseStamped(header=header, pose=_on_floor(at, 0.0)) for at in event.way]
+                self._plan.publish(Path(header=header, poses=poses))
             case RobotMoved():
-                self._pose.publish(robot_pose(event, stamp, self._frame_id))
-                self._battery.publish(battery_state(event, stamp))
+                # As AMCL publishes it; the simulated pose is exact.
+                moved = PoseWithCovarianceStamped(header=header)
+                moved.pose.pose = _on_floor(event.position, event.yaw)
+                self._pose.publish(moved)
+                self._battery.publish(battery_state(event.battery, header.stamp))
             case PassCompleted():
                 self.get_logger().info(
                     f"pass {event.pass_index + 1} completed;"
@@ -165,53 +172,23 @@ def observation(event: Visited, stamp_ns: int, frame_id: str) -> Observation:
     return message
 
 
-def discovered_tags(event: TagsDiscovered, stamp: Time, frame_id: str) -> DiscoveredTags:
-    """Return perception's whole list."""
-    return DiscoveredTags(
-        header=Header(stamp=stamp, frame_id=frame_id),
-        tags=[
-            DiscoveredTag(
-                tag_id=tag.tag_id, pose_in_map=pose_message(pose_of(tag.position, tag.yaw))
-            )
-            for tag in event.tags
-        ],
-    )
-
-
-def occupancy_grid(event: MapGrown, stamp: Time, frame_id: str) -> OccupancyGrid:
+def occupancy_grid(grid: Grid, header: Header) -> OccupancyGrid:
     """Return the map."""
-    grid = event.grid
-    message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame_id))
-    message.info.map_load_time = stamp
+    message = OccupancyGrid(header=header, data=array("b", grid.cells))
+    message.info.map_load_time = header.stamp
     message.info.resolution = float(grid.resolution_m)
     message.info.width = int(grid.width)
     message.info.height = int(grid.height)
     message.info.origin.position = Point(x=float(grid.origin[0]), y=float(grid.origin[1]), z=0.0)
-    message.data = array("b", grid.cells)
     return message
 
 
-def robot_pose(event: RobotMoved, stamp: Time, frame_id: str) -> PoseWithCovarianceStamped:
-    """Return the robot's pose, as AMCL publishes it; the simulated pose is exact."""
-    message = PoseWithCovarianceStamped(header=Header(stamp=stamp, frame_id=frame_id))
-    message.pose.pose = _on_floor(event.position, event.yaw)
-    return message
-
-
-def path(event: WayPlanned, stamp: Time, frame_id: str) -> Path:
-    """Return the planned path, as Nav2's planner publishes it."""
-    header = Header(stamp=stamp, frame_id=frame_id)
-    poses = [PoseStamped(header=header, pose=_on_floor(point, 0.0)) for point in event.way]
-    return Path(header=header, poses=poses)
-
-
-def battery_state(event: RobotMoved, stamp: Time) -> BatteryState:
+def battery_state(level: float, stamp: Time) -> BatteryState:
     """Return the battery state; quantities that are not simulated are NaN, as BatteryState asks."""
-    message = BatteryState(header=Header(stamp=stamp), percentage=float(event.battery))
+    message = BatteryState(header=Header(stamp=stamp), percentage=float(level), present=True)
     for name in ("voltage", "temperature", "current", "charge", "capacity", "design_capacity"):
         setattr(message, name, float("nan"))
     message.power_supply_status = BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
-    message.present = True
     return message
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Table, Tag
+from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Rect, Tag
 from lupin_twin.core.state import Bloom, Flower, Reading
 
 
@@ -95,20 +95,19 @@ class Plants:
             flower_count=len(seen),
             bug_count=bugs,
             blooms=seen,
-            footprint=tuple((x, y, 0.0) for x, y in self._tags[tag_id].table.rect.corners),
+            footprint=tuple((x, y, 0.0) for x, y in self._tags[tag_id].table.corners),
         )
 
 
-def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
+def _grow(table: Rect, species: str, seed: int) -> Iterator[Bloom]:
     """Plant a table in rows, spaced wider than the position noise; most plants flower."""
     chance = stream(seed, "grow", table.name)
-    rect = table.rect
-    columns = max(1, round((rect.x1 - rect.x0) / _PLANT_SPACING_M))
-    rows = max(1, round((rect.y1 - rect.y0) / _PLANT_SPACING_M))
+    columns = max(1, round((table.x1 - table.x0) / _PLANT_SPACING_M))
+    rows = max(1, round((table.y1 - table.y0) / _PLANT_SPACING_M))
     for row in range(rows):
         for column in range(columns):
-            x = rect.x0 + (column + 0.5) * (rect.x1 - rect.x0) / columns
-            y = rect.y0 + (row + 0.5) * (rect.y1 - rect.y0) / rows
+            x = table.x0 + (column + 0.5) * (table.x1 - table.x0) / columns
+            y = table.y0 + (row + 0.5) * (table.y1 - table.y0) / rows
             height_m = chance.uniform(0.12, 0.38)
             if chance.random() < _IN_FLOWER:
                 z = TABLE_HEIGHT_M + height_m
@@ -181,7 +180,7 @@ class Exploration:
         self._x = self._origin[0] + (column + 0.5) * RESOLUTION_M
         self._y = self._origin[1] + (row + 0.5) * RESOLUTION_M
         occupied = (row == 0) | (row == rows - 1) | (column == 0) | (column == columns - 1)
-        for box in (table.rect for table in greenhouse.tables):
+        for box in greenhouse.tables:
             inside_x = (box.x0 < self._x) & (self._x < box.x1)
             occupied |= inside_x & (box.y0 < self._y) & (self._y < box.y1)
         self._truth = np.where(occupied, OCCUPIED, FREE).astype(np.int8)

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
-from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
+from lupin_msgs.msg import DiscoveredTags, Observation
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -443,8 +443,4 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _publish_tags(self) -> None:
         if self._scans.places:
             header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._config.frame_id)
-            tags = [
-                DiscoveredTag(tag_id=tag_id, pose_in_map=convert.pose_message(place))
-                for tag_id, place in self._scans.places.items()
-            ]
-            self._send(self._tags, DiscoveredTags(header=header, tags=tags))
+            self._send(self._tags, convert.discovered_tags_message(self._scans.places, header))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -24,6 +24,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Point32, Polygon, PoseStamped, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
 from lupin_msgs.msg import (
+    DiscoveredTag,
+    DiscoveredTags,
     FlowerObservation,
     FlowerPoint,
     Observation,
@@ -312,6 +314,14 @@ def observation_message(write: Scan | Inspection, frame_id: str) -> Any:
             **flower_fields(flower),
         )
     return message
+
+
+def discovered_tags_message(places: Mapping[str, Pose], header: Any) -> Any:
+    """Where tags are, as lupin_msgs/DiscoveredTags."""
+    tags = (
+        DiscoveredTag(tag_id=tag_id, pose_in_map=pose_message(at)) for tag_id, at in places.items()
+    )
+    return DiscoveredTags(header=header, tags=list(tags))
 
 
 def _readings_message(readings: Iterable[Reading]) -> list[Any]:

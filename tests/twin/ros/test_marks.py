@@ -3,7 +3,7 @@
 import pytest
 
 from lupin_twin.core.state import NO_FLOWER, Flower, Pose, Snapshot, TagState
-from lupin_twin.ros.layers import FRESH_S, OLD_S, PlanterMark, appearance_of, planter_marks
+from lupin_twin.ros.layers import FRESH_S, OLD_S, appearance_of, planter_marks
 
 NOW_NS = 10_000_000_000_000
 BOX = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.5, 0.0))
@@ -38,4 +38,5 @@ def test_a_planter_is_marked_once_with_the_number_of_its_first_tag() -> None:
             (tag("bare"), tag("a", flower=seen), tag("b", flower=others), tag("c", flower=seen)),
         )
     )
-    assert marks == [PlanterMark(1, BOX), PlanterMark(2, others.footprint)]
+    outlines = [(1, (*BOX, BOX[0])), (2, (*others.footprint, others.footprint[0]))]
+    assert [(mark.number, mark.points) for mark in marks] == outlines

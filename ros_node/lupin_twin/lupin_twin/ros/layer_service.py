@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass
@@ -35,12 +35,11 @@ from lupin_twin.field.idw import Abandoned
 from lupin_twin.ros.base_node import NO_EVENTS, qos_of
 from lupin_twin.ros.layers import (
     MAX_POINTS,
+    Mark,
     cloud,
     marker_array,
-    planter_markers,
     planter_marks,
     points,
-    tag_markers,
     tag_marks,
 )
 from lupin_twin.ros.parameters import naming
@@ -102,12 +101,9 @@ class LayerService:
             with naming("layers", sensor):
                 publisher = self._publisher(PointCloud2, LAYERS_BELOW + sensor, LAYERS)
             self._topics.append(_Topic(publisher, partial(self._plan_layer, sensor)))
-        for topic, marks, make in (
-            (TAGS, tag_marks, tag_markers),
-            (PLANTERS, planter_marks, planter_markers),
-        ):
+        for topic, marks in (TAGS, tag_marks), (PLANTERS, planter_marks):
             publisher = self._publisher(MarkerArray, topic.name, topic)
-            self._topics.append(_Topic(publisher, partial(self._plan_markers, marks, make)))
+            self._topics.append(_Topic(publisher, partial(self._plan_markers, marks)))
 
     def _publisher(self, kind: Any, name: str, topic: Topic) -> Any:
         return self._twin.utilities.node.create_publisher(
@@ -203,21 +199,16 @@ class LayerService:
         box = default_box(places, rules.max_distance_m)
         return default_request(sensor, box, min(rules.max_grid_cells, MAX_POINTS))
 
-    def _plan_markers(
-        self,
-        marks_of: Callable[[Snapshot], Sequence[Any]],
-        make: Callable[[Any, str], list[Any]],
-        topic: _Topic,
-    ) -> Work:
+    def _plan_markers(self, marks_of: Callable[[Snapshot], Iterable[Mark]], topic: _Topic) -> Work:
         snapshot = self._twin.snapshot()
 
         def work(_: ShouldStop) -> bytes | None:
             # Markers show ages: whether they have changed is known only now.
-            marks = marks_of(snapshot)
+            marks = tuple(marks_of(snapshot))
             if marks == topic.key:
                 return None
             topic.key = marks
-            return marker_array(marks, make, snapshot.frame_id)
+            return marker_array(marks, snapshot.frame_id)
 
         return work
 

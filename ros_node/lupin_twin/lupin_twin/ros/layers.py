@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
@@ -37,22 +37,31 @@ MIN_CORNERS: Final = 3
 Appearance = Literal["fresh", "fading", "old", "failed"]
 
 
-class TagMark(NamedTuple):
-    """A tag at its position, m, map frame."""
+TAG_M: Final = 0.15
+TEXT_M: Final = 0.12
+OUTLINE_M: Final = 0.03
+# Red, green, blue. Colours show age and failure, but no status, so they are neither green nor red,
+# which on the page show a status. For people who cannot see colours, a failure is in the text too.
+COLOURS: Final[Mapping[Appearance, tuple[float, float, float]]] = {
+    "fresh": (0.10, 0.42, 0.85),
+    "fading": (0.55, 0.72, 0.92),
+    "old": (0.55, 0.55, 0.55),
+    "failed": (0.75, 0.20, 0.65),
+}
+PLANTER_COLOUR: Final = (0.55, 0.38, 0.22)
 
+
+class Mark(NamedTuple):
+    """What a marker shows, as values that can be compared; positions and sizes in m, map frame."""
+
+    namespace: str
     number: int
-    tag_id: str
-    x: float
-    y: float
-    z: float
-    appearance: Appearance
-
-
-class PlanterMark(NamedTuple):
-    """A planter's outline, (x, y, z) in m, map frame; the number is that of its first tag."""
-
-    number: int
-    corners: tuple[tuple[float, float, float], ...]
+    kind: int
+    scale: tuple[float, float, float]
+    colour: tuple[float, float, float]
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    text: str = ""
+    points: tuple[tuple[float, float, float], ...] = ()
 
 
 def appearance_of(tag: TagState, now_ns: int | None) -> Appearance:
@@ -68,24 +77,31 @@ def appearance_of(tag: TagState, now_ns: int | None) -> Appearance:
     return "fading" if age_s < OLD_S else "old"  # false for NaN too
 
 
-def tag_marks(snapshot: Snapshot) -> list[TagMark]:
-    """The tags that have a pose."""
-    now_ns = snapshot.now_ns
-    return [
-        TagMark(number, tag.tag_id, tag.pose.x, tag.pose.y, tag.pose.z, appearance_of(tag, now_ns))
-        for number, tag in enumerate(snapshot.tags)
-        if tag.pose is not None
-    ]
-
-
-def planter_marks(snapshot: Snapshot) -> list[PlanterMark]:
-    """The planters whose outline was seen, each once: tags on the same planter have the same."""
-    found: dict[tuple[tuple[float, float, float], ...], int] = {}
+def tag_marks(snapshot: Snapshot) -> Iterator[Mark]:
+    """A ball where each tag is that has a pose, and its name above it."""
+    ball, text = (TAG_M, TAG_M, TAG_M), (0.0, 0.0, TEXT_M)
     for number, tag in enumerate(snapshot.tags):
-        corners = tag.flower.footprint
-        if len(corners) >= MIN_CORNERS and all(map(math.isfinite, chain(*corners))):
-            found.setdefault(corners, number)
-    return [PlanterMark(number, corners) for corners, number in found.items()]
+        if tag.pose is not None:
+            look, x, y, z = appearance_of(tag, snapshot.now_ns), tag.pose.x, tag.pose.y, tag.pose.z
+            name = f"{tag.tag_id} (failed)" if look == "failed" else tag.tag_id
+            above = x, y, z + TAG_M
+            yield Mark("tags", number, Marker.SPHERE, ball, COLOURS[look], (x, y, z))
+            yield Mark("names", number, Marker.TEXT_VIEW_FACING, text, COLOURS[look], above, name)
+
+
+def planter_marks(snapshot: Snapshot) -> Iterator[Mark]:
+    """The closed outline of each planter that was seen, numbered as its first tag.
+
+    Tags on the same planter have the same outline.
+    """
+    found: set[tuple[tuple[float, float, float], ...]] = set()
+    for number, tag in enumerate(snapshot.tags):
+        corners, line = tag.flower.footprint, (OUTLINE_M, 0.0, 0.0)
+        is_outline = len(corners) >= MIN_CORNERS and all(map(math.isfinite, chain(*corners)))
+        if is_outline and corners not in found:
+            found.add(corners)
+            closed = *corners, corners[0]
+            yield Mark("planters", number, Marker.LINE_STRIP, line, PLANTER_COLOUR, points=closed)
 
 
 # A point takes 20 bytes: no message is larger than 1 MB, whatever max_grid_cells is. With messages
@@ -124,19 +140,6 @@ def points(grid: FieldGrid, estimate: EstimateGrid | None) -> PointArray:
 
 _FLOAT32_BYTES: Final = 4
 
-TAG_M: Final = 0.15
-TEXT_M: Final = 0.12
-OUTLINE_M: Final = 0.03
-# Red, green, blue. Colours show age and failure, but no status, so they are neither green nor red,
-# which on the page show a status. For people who cannot see colours, a failure is in the text too.
-COLOURS: Final[Mapping[Appearance, tuple[float, float, float]]] = {
-    "fresh": (0.10, 0.42, 0.85),
-    "fading": (0.55, 0.72, 0.92),
-    "old": (0.55, 0.55, 0.55),
-    "failed": (0.75, 0.20, 0.65),
-}
-PLANTER_COLOUR: Final = (0.55, 0.38, 0.22)
-
 
 def cloud(points: PointArray, stamp_ns: int, frame_id: str) -> bytes:
     """The points as a serialised sensor_msgs/PointCloud2, at the time of the state."""
@@ -159,71 +162,31 @@ def cloud(points: PointArray, stamp_ns: int, frame_id: str) -> bytes:
     return bytes(serialize_message(message))
 
 
-def tag_markers(mark: TagMark, frame_id: str) -> list[Any]:
-    """A ball where the tag is, and its name above it."""
-    colour = COLOURS[mark.appearance]
-    text = f"{mark.tag_id} (failed)" if mark.appearance == "failed" else mark.tag_id
-    return [
-        _marker(
-            (frame_id, "tags", mark.number),
-            Marker.SPHERE,
-            Vector3(x=TAG_M, y=TAG_M, z=TAG_M),
-            colour,
-            pose=Pose(position=Point(x=mark.x, y=mark.y, z=mark.z)),
-        ),
-        _marker(
-            (frame_id, "names", mark.number),
-            Marker.TEXT_VIEW_FACING,
-            Vector3(z=TEXT_M),
-            colour,
-            pose=Pose(position=Point(x=mark.x, y=mark.y, z=mark.z + TAG_M)),
-            text=text,
-        ),
-    ]
-
-
-def planter_markers(mark: PlanterMark, frame_id: str) -> list[Any]:
-    """The planter's outline, closed."""
-    return [
-        _marker(
-            (frame_id, "planters", mark.number),
-            Marker.LINE_STRIP,
-            Vector3(x=OUTLINE_M),
-            PLANTER_COLOUR,
-            points=[Point(x=x, y=y, z=z) for x, y, z in (*mark.corners, mark.corners[0])],
-        )
-    ]
-
-
-def _marker(
-    which: tuple[str, str, int],
-    kind: int,
-    scale: Any,
-    colour: tuple[float, float, float],
-    **more: Any,
-) -> Any:
-    (frame_id, namespace, number), (red, green, blue) = which, colour
-    return Marker(
-        header=Header(frame_id=frame_id),
-        ns=namespace,
-        id=number,
-        type=kind,
-        action=Marker.ADD,
-        scale=scale,
-        color=ColorRGBA(r=red, g=green, b=blue, a=1.0),
-        **more,
-    )
-
-
-def marker_array(
-    marks: Sequence[Any], make: Callable[[Any, str], list[Any]], frame_id: str
-) -> bytes:
-    """A serialised visualization_msgs/MarkerArray; `make(mark, frame_id)` gives a mark's markers.
+def marker_array(marks: Iterable[Mark], frame_id: str) -> bytes:
+    """The marks as a serialised visualization_msgs/MarkerArray; lets other threads run meanwhile.
 
     It is complete: its first marker deletes all earlier ones, so that nothing outdated stays in a
-    viewer, not even from an earlier twin. It lets other threads run meanwhile.
+    viewer, not even from an earlier twin.
     """
-    markers = [Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)]
-    for mark in in_turns(marks):
-        markers += make(mark, frame_id)
+    header = Header(frame_id=frame_id)
+    markers = [Marker(header=header, action=Marker.DELETEALL)]
+    markers += [
+        Marker(
+            header=header,
+            ns=mark.namespace,
+            id=mark.number,
+            type=mark.kind,
+            action=Marker.ADD,
+            scale=_xyz(Vector3, mark.scale),
+            color=ColorRGBA(**dict(zip("rgb", mark.colour, strict=True)), a=1.0),
+            pose=Pose(position=_xyz(Point, mark.position)),
+            text=mark.text,
+            points=[_xyz(Point, at) for at in mark.points],
+        )
+        for mark in in_turns(marks)
+    ]
     return bytes(serialize_message(MarkerArray(markers=markers)))
+
+
+def _xyz(kind: Any, at: tuple[float, float, float]) -> Any:
+    return kind(**dict(zip("xyz", at, strict=True)))

@@ -113,7 +113,7 @@ def test_a_clock_behind_the_recording_is_named_once_with_what_to_do_first(
     with bridge("--ros-args", "-p", f"journal:={journal}") as running:
         hmi = open_page(running.url, "list=alarms", viewport=PHONE)
         banners = hmi.page.locator(".banners")
-        expect(banners).to_have_text(re.compile("^Set the twin’s clock.*recording waits"))
+        expect(banners).to_have_text(re.compile("^Set the twin’s clock.*nothing is recorded"))
         expect(banners).not_to_contain_text(re.compile(r"\dT\d"))
         box = banners.bounding_box()
         assert box is not None

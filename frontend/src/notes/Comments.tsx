@@ -44,7 +44,7 @@ export function Comments({
       <CommentList subject={subject} moment={moment} />
       {isOpen && (
         <CommentField
-          subject={subject}
+          subjects={[subject]}
           moment={moment}
           onDone={() => {
             setOpen(false);
@@ -119,12 +119,13 @@ function CommentRow({
 const LONGEST = 500;
 
 export function CommentField({
-  subject,
+  subjects,
   moment,
   name = moment === null ? C.now : C.then(rosText(moment)),
   onDone,
 }: {
-  subject: string;
+  /** As of when the field opened; each gets the comment. */
+  subjects: readonly string[];
   /** The field's label. */
   name?: string;
   /** The time that the comment is about, ROS seconds; null: now. */
@@ -135,6 +136,8 @@ export function CommentField({
   const [fault, setFault] = useState('');
   const [isSending, setSending] = useState(false);
   const field = useRef<HTMLTextAreaElement>(null);
+  /** Those still without the comment: saving again after a failure repeats none. */
+  const left = useRef([...subjects]);
   useEffect(() => {
     field.current?.focus();
   }, []);
@@ -142,13 +145,16 @@ export function CommentField({
     event.preventDefault();
     setSending(true);
     const until = moment === null ? {} : { until: moment.toFixed(3) };
-    postNote({ kind: 'comment', subject, text: text.trim(), ...until }).then(
-      onDone,
-      (error: unknown) => {
-        setSending(false);
-        setFault(C.failed(failureText(error)));
-      },
-    );
+    const post = async (): Promise<void> => {
+      for (let [subject] = left.current; subject !== undefined; [subject] = left.current) {
+        await postNote({ kind: 'comment', subject, text: text.trim(), ...until });
+        left.current.shift();
+      }
+    };
+    post().then(onDone, (error: unknown) => {
+      setSending(false);
+      setFault(C.failed(failureText(error)));
+    });
   };
   return (
     <form className="comment-field" onSubmit={send}>
@@ -195,5 +201,5 @@ export function SiteComment(): JSX.Element | null {
 
 function OfMoment(): JSX.Element {
   const moment = useApp((state) => state.view.moment);
-  return <CommentField subject="site" moment={moment} onDone={useClose()} />;
+  return <CommentField subjects={['site']} moment={moment} onDone={useClose()} />;
 }

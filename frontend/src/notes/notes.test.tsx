@@ -7,7 +7,7 @@ import { person } from '../store/create';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { clustersOf, NoteMarks, standing, standingNotes, startNotes } from './NoteMarks';
-import { Comments, SiteComment } from './Comments';
+import { CommentField, Comments, SiteComment } from './Comments';
 
 const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
   id,
@@ -102,6 +102,26 @@ test('who may write does, and withdraws their own words alone', async () => {
     'DELETE /api/notes/mine ',
     'POST /api/notes {"kind":"comment","subject":"tag:7","text":"dry"}',
   ]);
+});
+
+test('each alarm of a heading gets the comment once, also after a failure', async () => {
+  const answers = [true, false, true];
+  const heard: unknown[] = [];
+  vi.stubGlobal('fetch', (_: URL, { body }: { body: string }) => {
+    const { subject } = JSON.parse(body) as { subject: string };
+    heard.push(subject);
+    return answers.shift() ? Promise.resolve(Response.json({})) : Promise.reject(new TypeError());
+  });
+  const onDone = vi.fn();
+  render(<CommentField subjects={['alarm:a', 'alarm:b']} moment={null} onDone={onDone} />);
+  fireEvent.change(screen.getByLabelText('Comment (now)'), { target: { value: 'valve stuck' } });
+  fireEvent.click(screen.getByRole('button', { name: 'Save' }));
+  expect((await screen.findByRole('alert')).textContent).toMatch(/^Not saved/);
+  fireEvent.click(screen.getByRole('button', { name: 'Save' }));
+  await waitFor(() => {
+    expect(onDone).toHaveBeenCalledOnce();
+  });
+  expect(heard).toEqual(['alarm:a', 'alarm:b', 'alarm:b']);
 });
 
 test('Escape leaves the field, and not what it stands in', () => {

@@ -54,7 +54,7 @@ test.each([
 test.each([
   ['no_clock', 'Start the simulation or the recording.', /age of the readings is unknown/],
   ['clock_stopped', 'Check the simulation or the recording.', /age of the readings is unknown/],
-  ['clock_doubted', 'Set the twin’s clock.', /ages are unknown and recording waits/],
+  ['clock_doubted', 'Set the twin’s clock.', /ages are unknown and nothing is recorded/],
 ] as const)(
   'data without a valid time are not dated, and what to do comes first: %s',
   (reason, todo, why) => {

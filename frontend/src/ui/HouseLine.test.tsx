@@ -21,7 +21,7 @@ test('shows the scan interval, the last scan and overdue tags', () => {
   // Built states are seconds old, whatever their stamp.
   const lineText = line({ interval_s: 4000, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
   expect(lineText).toMatch(
-    /^2 tags overdue · last scan .+ ago · each tag every 1\u00a0h 6\u00a0min$/,
+    /^2 tags overdue · last scan .+ ago · each tag scanned every 1\u00a0h 6\u00a0min$/,
   );
 });
 
@@ -34,7 +34,7 @@ test.each([
   [43_200, '12\u00a0h'],
 ])('of %s s between two scans', (interval_s, lineText) => {
   expect(line({ interval_s, last_scan: null, overdue: 0 })).toBe(
-    `no tag overdue · no scan yet · each tag every ${lineText}`,
+    `no tag overdue · no scan yet · each tag scanned every ${lineText}`,
   );
 });
 
@@ -81,7 +81,7 @@ test.each([
     'after one and a half rounds and a minute',
     1.2,
     61,
-    /^No scan for 1\u00a0min \(usually each tag every 1.2\u00a0s\) · Check the robot$/,
+    /^No scan for 1\u00a0min \(usually each tag is scanned every 1.2\u00a0s\) · Check the robot$/,
   ],
   ['not within a minute', 1.2, 59, /^no tag overdue/],
   ['not while it rests between two rounds', 1200, 1200, /^no tag overdue/],

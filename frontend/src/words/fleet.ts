@@ -7,7 +7,7 @@ const ENGLISH = {
   filter: 'Filter by status',
   all: 'All',
   silent: 'Silent',
-  list: 'Greenhouses, the worst first',
+  list: 'Greenhouses, worst first',
   alarmsBeingRead: 'Loading alarms',
   noAlarms: 'No alarms',
   judging: 'Being assessed',
@@ -21,7 +21,7 @@ const ENGLISH = {
   disconnected: (time: string): string =>
     `No connection to the server since ${time}. The last known state is shown.`,
   sites: 'Greenhouses',
-  alarmList: 'Alarms of all greenhouses, the worst first',
+  alarmList: 'Alarms of all greenhouses, worst first',
   others: 'Other greenhouses',
   compare: 'Compare',
   empty: 'No greenhouse sends data to this archive yet.',
@@ -80,7 +80,7 @@ const DUTCH: FleetWords = {
   alarmList: 'Alarmen van alle kassen, de ergste eerst',
   others: 'Andere kassen',
   compare: 'Vergelijken',
-  empty: 'Nog geen kas stuurt gegevens naar dit archief.',
+  empty: 'Er stuurt nog geen kas gegevens naar dit archief.',
   noMatch: 'Geen kas voldoet aan het filter.',
   shown: (count, all) => `${count} van ${all} kassen getoond`,
 };

@@ -11,7 +11,7 @@ const ENGLISH = {
   median: 'Median of all; band: the middle half',
   draw: (site: string): string => `Show ${site}`,
   someCompared: (count: number, all: number): string =>
-    `${count} of ${all} greenhouses are compared, the worst first. Search to choose others.`,
+    `${count} of ${all} greenhouses are compared, worst first. Search to choose others.`,
   notFetched: (reason: string): string => `This could not be loaded: ${reason}`,
   hours: (count: number): string => `Last ${count} hours`,
   scans: 'Scans',

@@ -196,7 +196,7 @@ def test_open_alarms_come_first_with_the_worst_value_and_its_status() -> None:
         ("en", "just below 350 ppm"),
         ("de", "knapp unter 350 ppm"),
         ("nl", "net onder 350 ppm"),
-        ("es", "justo por debajo de 350 ppm"),
+        ("es", "justo bajo 350 ppm"),
     ],
 )
 def test_values_of_a_sensor_have_equal_digits_and_none_looks_like_its_limit(

@@ -111,9 +111,9 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
       {form === 'shelve' && (
         <Shelving items={open} title={S.alarmWhat(allText(S.alarmShelve, open, items), name)} />
       )}
-      {form === 'comment' && oldest && (
+      {form === 'comment' && (
         <CommentField
-          subject={`alarm:${oldest.id}`}
+          subjects={items.map(({ alarm }) => `alarm:${alarm.id}`)}
           moment={null}
           name={S.alarmWhat(C.comment, name)}
           onDone={close}
@@ -133,10 +133,10 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
           {onAll(S.alarmUnacknowledge, acknowledged, then(unacknowledgeAlarms))}
           {onAll(S.alarmUnshelve, shelved, then(unshelveAlarms))}
           {onAll(S.alarmShelve, open, () => setForm('shelve'))}
-          {/* A comment is about one alarm. */}
-          {items.length === 1 &&
-            who?.can_write_notes === true &&
-            act(C.comment, () => setForm('comment'))}
+          {who?.can_write_notes === true &&
+            act(items.length === 1 ? C.comment : `${C.comment} (${items.length})`, () =>
+              setForm('comment'),
+            )}
         </ul>
       )}
     </div>

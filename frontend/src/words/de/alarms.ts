@@ -96,7 +96,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmNotifyMe: 'Alarme melden',
   alarmSound: 'Ton',
   alarmSoundHints: {
-    ready: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer in 10 s.',
+    ready: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer alle 10 s.',
     waits: 'Der Browser erlaubt den Ton nach dem ersten Klick auf dieser Seite.',
     none: 'Dieser Browser kann keinen Ton abspielen.',
   },
@@ -133,8 +133,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     must: {
-      below: (limit) => `muss über ${limit} steigen`,
-      above: (limit) => `muss unter ${limit} sinken`,
+      below: (limit) => `muss über ${limit}`,
+      above: (limit) => `muss unter ${limit}`,
     },
     just: {
       below: (limit) => `knapp unter ${limit}`,
@@ -232,7 +232,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
 
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
-  side: { below: 'tief', above: 'hoch' },
+  side: { below: 'niedrig', above: 'hoch' },
   below: 'zu niedrig',
   above: 'zu hoch',
 };

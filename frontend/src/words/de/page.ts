@@ -48,7 +48,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     clock_stopped:
       'Von dort bekommt der Zwilling seine Zeit; sie steht still. Das Alter der Werte ist unbekannt.',
     clock_doubted:
-      'Sie geht gegenüber der Aufzeichnung nach. Bis sie stimmt, höchstens zehn Minuten lang, ist das Alter der Werte unbekannt, und die Aufzeichnung wartet.',
+      'Sie geht gegenüber der Aufzeichnung nach. Bis sie gestellt ist, höchstens zehn Minuten lang, ist das Alter der Werte unbekannt, und nichts wird aufgezeichnet.',
     clock_ahead: 'Sie geht gegenüber dem Archiv vor; das Alter der Werte ist unbekannt.',
     never_seen:
       'Der Server hat noch keine Daten von einem Zwilling. Ist der Zwilling eingeschaltet?',

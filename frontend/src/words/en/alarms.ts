@@ -227,11 +227,11 @@ export const HEALTH = {
   /** Of a tag that is unknown although it has recent readings. */
   healthNoRange: 'No reading with an ideal range',
   healthFilter: ', show only these tags',
-  scanInterval: (interval: string): string => `each tag every ${interval}`,
+  scanInterval: (interval: string): string => `each tag scanned every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,
   houseNever: 'no scan yet',
   houseLate: (age: string, interval: string): string =>
-    `No scan for ${age} (usually each tag every ${interval})`,
+    `No scan for ${age} (usually each tag is scanned every ${interval})`,
   houseOverdue: (count: number): string =>
     count === 0 ? 'no tag overdue' : counted(count, 'tag overdue', 'tags overdue'),
   /** For screen readers. */

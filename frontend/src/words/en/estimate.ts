@@ -4,13 +4,13 @@ import { counted, whole } from './counted';
 export const ESTIMATE = {
   about: 'What ± means',
   aboutText:
-    'Nine out of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
-    'depends on the distance and age of the readings, and on the time of day. The longer nothing ' +
-    'is measured, the larger the ±.',
+    'Nine out of ten estimated values should be off by no more than the ± (a 90 % interval). ' +
+    'The ± depends on the distance and age of the readings, and on the time of day. The longer ' +
+    'nothing is measured, the larger it gets.',
   onItsWay: 'Loading the estimate',
   noneNow: 'No estimate at the moment: the nearest readings are shown',
   computed: 'A computed quantity has no estimate: the nearest readings are shown',
-  noModel: 'No estimate yet: it needs ten scans of a sensor',
+  noModel: 'No estimate yet: ten scans of a sensor are needed',
   unsure: (error: string): string =>
     `Hatched colour: less certain than ±${error}. No colour: no data`,
   /** Beside the error's colour scale. */
@@ -20,7 +20,7 @@ export const ESTIMATE = {
   predictedNone: 'No scan has been compared with it yet',
   fitProblem: (reason: string): string => `The model does not fit this greenhouse well: ${reason}`,
   notTrusted: (count: number): string =>
-    `Error range is too narrow: only ${count} of 10 scans were within it, not 9.`,
+    `Error range is too narrow: only ${count} of 10 scans were within it; it should be 9.`,
   near: (count: number): string =>
     count === 0 ? 'no tag nearby' : counted(count, 'tag nearby', 'tags nearby'),
   oldest: (age: string): string => `oldest reading ${age} ago`,

@@ -205,7 +205,7 @@ export const CHARTS = {
   chartLoading: 'Loading history',
   chartFailed: (reason: string): string =>
     `History could not be loaded (${reason}); the page keeps trying.`,
-  chartNoTime: 'The twin has no time yet, so there is no history.',
+  chartNoTime: 'The twin’s time is not known yet, so there is no history.',
   chartIdealsDiffer: 'Ideal ranges differ by species',
   chartNoSensors: 'This tag has no sensor.',
   chartTable: 'Show as table',

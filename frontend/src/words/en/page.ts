@@ -49,7 +49,7 @@ export const PAGE = {
     clock_stopped:
       'The twin takes its time from it, and that has stopped. The age of the readings is unknown.',
     clock_doubted:
-      'It is behind the recorded data. Until it is right, for at most ten minutes, ages are unknown and recording waits.',
+      'It is behind the recorded data. Until it is set, for ten minutes at most, ages are unknown and nothing is recorded.',
     clock_ahead: 'It is ahead of the archive’s clock, so ages are unknown.',
     never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
     stale: 'The twin has stopped sending. Check that it is running.',

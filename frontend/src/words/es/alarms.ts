@@ -22,7 +22,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when) => `desde ${when}`,
-  alarmForOver: (length) => `hace más de ${length}`,
+  alarmForOver: (length) => `más de ${length}`,
   alarmUntil: (from, until, length) => `de ${from} a ${until} (${length})`,
   alarmNow: (reading) => `ahora ${reading}`,
   alarmNowUnknown: (last, age) =>
@@ -37,7 +37,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   },
   alarmFirst: (reading) => `al inicio ${reading}`,
   alarmStatus: { critical: 'crítico', healthy: 'dentro del rango' },
-  alarmBack: 'Ya en orden',
+  alarmBack: 'De nuevo normal',
   alarmShow: 'Mostrar este punto ahora',
   alarmStart: 'Ir al inicio',
   alarmActionsOf: (what) => `Acciones: ${what}`,
@@ -138,8 +138,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       above: (limit) => `debe bajar de ${limit}`,
     },
     just: {
-      below: (limit) => `justo por debajo de ${limit}`,
-      above: (limit) => `justo por encima de ${limit}`,
+      below: (limit) => `justo bajo ${limit}`,
+      above: (limit) => `justo sobre ${limit}`,
     },
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
     implausible: (reading) => `${reading}: valor inverosímil`,
@@ -167,7 +167,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     },
     outOfRange: 'fuera de rango',
     changed: (reading) => `${reading}: posible fallo del sensor`,
-    silent: 'Sin datos actuales del gemelo',
+    silent: 'Sin datos actuales del gemelo digital',
     stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -190,7 +190,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     pest: 'Revisar y tratar',
     old: 'Revisar la ruta del robot',
     changed: 'Comparar con otro medidor',
-    silent: 'Revisar gemelo, servidor y red',
+    silent: 'Revisar gemelo digital, servidor y red',
     stopped: 'Revisar el robot',
     other: 'Comprobar in situ',
   },
@@ -221,11 +221,11 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthNoRange: 'Ninguna lectura con rango ideal',
   healthFilter: ', mostrar solo estos puntos',
-  scanInterval: (interval) => `cada punto cada ${interval}`,
+  scanInterval: (interval) => `cada punto se mide cada ${interval}`,
   houseLast: (age) => `última medición hace ${age}`,
   houseNever: 'aún sin mediciones',
   houseLate: (age, interval) =>
-    `Sin mediciones desde hace ${age} (normalmente, cada punto cada ${interval})`,
+    `Sin mediciones desde hace ${age} (lo normal: cada punto cada ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'ningún punto con retraso'
@@ -237,8 +237,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     `Sin problemas conocidos; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
-  tooLow: (by) => (by === null ? 'por debajo del límite' : `${by} por debajo del ideal`),
-  tooHigh: (by) => (by === null ? 'por encima del límite' : `${by} por encima del ideal`),
+  tooLow: (by) => (by === null ? 'bajo el mínimo' : `${by} por debajo del ideal`),
+  tooHigh: (by) => (by === null ? 'sobre el máximo' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
   below: 'por debajo',
   above: 'por encima',

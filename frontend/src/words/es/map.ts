@@ -8,7 +8,8 @@ const SHORT = new Map([
   ['Humedad relativa (HR)', 'HR'],
   ['Humedad del sustrato', 'Sustrato'],
   ['Déficit de vapor (DPV)', 'DPV'],
-  ['Punto de rocío', 'P. de rocío'],
+  ['Punto de rocío', 'P. rocío'],
+  ['Margen de rocío', 'M. rocío'],
 ]);
 
 export const MAP: In<typeof EN.MAP> = {
@@ -30,7 +31,7 @@ export const MAP: In<typeof EN.MAP> = {
     boxes: 'Jardineras',
     blooms: 'Flores',
     pins: 'Puntos de medida',
-    labels: 'Rótulos',
+    labels: 'Etiquetas',
     advice: 'Puntos propuestos',
   },
   scaleBar: (length) => `Escala: ${length}`,
@@ -123,11 +124,11 @@ export const TAGS: In<typeof EN.TAGS> = {
   farOffLong: (place) =>
     `Su posición (${place}) está muy lejos de los demás puntos, así que el punto no está en el mapa.`,
   ageUnknown: 'desconocida',
-  ageUnknownLong: 'Se desconoce la antigüedad hasta que se conozca la hora del gemelo.',
+  ageUnknownLong: 'Se desconoce la antigüedad hasta que se conozca la hora del gemelo digital.',
   neverObserved: 'nunca',
   neverObservedLong: 'Ninguna medición ha dado todavía una lectura.',
   notKnownThenLong: 'Esto ya no se conserva o aún no estaba registrado.',
-  ageUnreportedLong: 'Este gemelo no comunica de cuándo son sus lecturas.',
+  ageUnreportedLong: 'Este gemelo digital no comunica de cuándo son sus lecturas.',
   attemptOutcomes: {
     ok: 'OK',
     unreachable: 'inaccesible',
@@ -166,8 +167,8 @@ export const TAGS: In<typeof EN.TAGS> = {
 
   card: (tag) => `Punto ${tag}`,
   cardClose: 'Cerrar',
-  cardGone: 'El gemelo no conoce este punto.',
-  cardGoneThen: 'El gemelo no conocía este punto entonces.',
+  cardGone: 'El gemelo digital no conoce este punto.',
+  cardGoneThen: 'El gemelo digital no conocía este punto entonces.',
   cardShow: 'Mostrar en el mapa',
   cardMore: (count) => `${count} más`,
   cardSource: 'Origen',
@@ -197,7 +198,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartLoading: 'Cargando el histórico',
   chartFailed: (reason) =>
     `No se pudo cargar el histórico (${reason}); la página lo sigue intentando.`,
-  chartNoTime: 'El gemelo aún no tiene hora: todavía no hay histórico.',
+  chartNoTime: 'Aún no se conoce la hora del gemelo digital: todavía no hay histórico.',
   chartIdealsDiffer: 'El rango ideal depende de la especie',
   chartNoSensors: 'Este punto no tiene sensores.',
   chartTable: 'Mostrar como tabla',

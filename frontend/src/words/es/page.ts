@@ -33,30 +33,30 @@ export const PAGE: In<typeof EN.PAGE> = {
     stale: 'La conexión está abierta, pero no llegan datos.',
     reconnecting: 'Sin conexión con el servidor.',
     connecting: 'Esperando la respuesta del servidor.',
-    offline: 'El servidor responde, pero el gemelo no.',
+    offline: 'El servidor responde, pero el gemelo digital no.',
   },
   clockTodo: {
     no_clock: 'Inicie la simulación o la grabación.',
     clock_stopped: 'Revise la simulación o la grabación.',
-    clock_doubted: 'Ponga en hora el reloj del gemelo.',
+    clock_doubted: 'Ponga en hora el reloj del gemelo digital.',
   },
   offlineWhy: {
     no_clock:
-      'El gemelo toma de ella la hora y aún no la tiene. Se desconoce la antigüedad de las lecturas.',
+      'El gemelo digital toma de ella la hora y aún no la tiene. Se desconoce la antigüedad de las lecturas.',
     clock_stopped:
-      'El gemelo toma de ella la hora, que se ha parado. Se desconoce la antigüedad de las lecturas.',
+      'El gemelo digital toma de ella la hora, que se ha parado. Se desconoce la antigüedad de las lecturas.',
     clock_doubted:
-      'Va atrasado respecto a los datos registrados. Hasta que esté en hora, como mucho diez minutos, se desconoce la antigüedad de las lecturas y el registro espera.',
+      'Va atrasado respecto a los datos registrados. Hasta que se ponga en hora, como mucho diez minutos, se desconoce la antigüedad de las lecturas y no se registra nada.',
     clock_ahead:
       'Va adelantado respecto al archivo central; se desconoce la antigüedad de las lecturas.',
-    never_seen: 'El servidor aún no ha recibido nada de un gemelo. ¿Está encendido el gemelo?',
-    stale: 'El gemelo ha dejado de enviar. Compruebe que está en marcha.',
-    thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
+    never_seen: 'El servidor aún no ha recibido nada de un gemelo digital. ¿Está encendido?',
+    stale: 'El gemelo digital ha dejado de enviar. Compruebe que está en marcha.',
+    thread_dead: 'El servidor ha perdido el contacto con el gemelo digital y hay que reiniciarlo.',
     shutting_down: 'El servidor se está apagando.',
   },
   offlineMore: {
-    no_clock: 'El gemelo funciona con tiempo simulado y no llega nada por /clock.',
-    clock_stopped: 'El gemelo funciona con tiempo simulado y ya no llega nada por /clock.',
+    no_clock: 'El gemelo digital funciona con tiempo simulado y no llega nada por /clock.',
+    clock_stopped: 'El gemelo digital funciona con tiempo simulado y ya no llega nada por /clock.',
     never_seen:
       'El gemelo y el puente («bridge») deben estar en el mismo dominio de ROS (ROS_DOMAIN_ID).',
     stale: 'El puente («bridge») funciona, pero ya no se publica nada en /twin/state.',
@@ -70,10 +70,11 @@ export const PAGE: In<typeof EN.PAGE> = {
       : `${count} mensajes del servidor no se pudieron leer y se descartaron.`,
   paused: 'El tiempo está en pausa.',
   pausedHint: 'La simulación o la grabación está en pausa; la antigüedad no aumenta.',
-  mixture: 'Más de un gemelo envía datos. La página muestra una mezcla: detenga todos menos uno.',
+  mixture:
+    'Más de un gemelo digital envía datos. La página muestra una mezcla: detenga todos menos uno.',
   inputProblem: 'Parte de los datos no llega.',
   drops: (count) =>
-    `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
+    `El gemelo digital ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
   journal: {
     off: {
       title: 'El registro está desactivado.',
@@ -85,19 +86,19 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'El registro está fallando.',
-      hint: 'El gemelo sigue en marcha. Si el disco está lleno, libere espacio; si es de solo lectura, permita la escritura. El registro se reanudará solo.',
+      hint: 'El gemelo digital sigue en marcha. Si el disco está lleno, libere espacio; si es de solo lectura, permita la escritura. El registro se reanudará solo.',
     },
     upgrading: {
       title: 'El registro de una versión anterior se está actualizando.',
       hint: 'Los datos nuevos se muestran, pero aún no se registran. Los anteriores vuelven al terminar; puede tardar unos minutos.',
     },
     in_use: {
-      title: 'Este gemelo no registra: otro usa su archivo.',
+      title: 'Este gemelo digital no registra: otro usa su archivo.',
       hint: 'Detenga uno de los dos o dé a este un archivo propio.',
     },
     foreign: {
-      title: 'Este gemelo no registra: no puede leer su archivo.',
-      hint: 'Su contenido no se ha tocado. Dé al gemelo otro archivo o mueva este.',
+      title: 'Este gemelo digital no registra: no puede leer su archivo.',
+      hint: 'Su contenido no se ha tocado. Dé al gemelo digital otro archivo o mueva este.',
     },
   },
   notificationChannels: {
@@ -108,7 +109,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationOther: (channel) => `${channel} no recibe datos.`,
   notificationHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',
   journalMore:
-    'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
+    'El archivo lo indica el parámetro «journal» del gemelo digital; con «off» no se registra nada.',
   origin: { simulated: 'Simulado', recorded: 'Grabado', sim_time: 'Tiempo simulado' },
   originDay: (length: string): string => `1 día de invernadero = ${length}`,
   originHint: {
@@ -126,7 +127,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
   failedTitle: 'La página ha fallado',
   failedHint:
-    'No se fíe de lo que muestra. El gemelo y el servidor no se ven afectados. La página se recarga sola.',
+    'No se fíe de lo que muestra. El gemelo digital y el servidor no se ven afectados. La página se recarga sola.',
   reload: 'Recargar',
 
   menu: 'Menú',

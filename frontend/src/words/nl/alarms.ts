@@ -91,7 +91,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmNotifyMe: 'Alarmen melden',
   alarmSound: 'Geluid',
   alarmSoundHints: {
-    ready: 'Een kort geluid bij nieuwe alarmen, hoogstens één per 10 s.',
+    ready: 'Een kort geluid bij nieuwe alarmen, hoogstens één keer per 10 s.',
     waits: 'De browser staat geluid toe na uw eerste klik op deze pagina.',
     none: 'Deze browser kan geen geluid afspelen.',
   },
@@ -197,7 +197,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'aangenomen, want licht en tijd zijn onbekend',
   },
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
-  healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
+  healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen de ideale grenzen',
   healthDespite: (alarms) =>
     alarms === '1'
       ? '1 alarm is nog actief: opgelost bij de volgende goede meting of controle'
@@ -206,7 +206,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Niet actueel',
   healthNoTime: 'Niet beoordeeld zolang de tijd onbekend is',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
-  healthNoRange: 'Geen meetwaarde met een ideaal bereik',
+  healthNoRange: 'Geen meetwaarde met ideale grenzen',
   healthFilter: ', alleen deze meetpunten tonen',
   scanInterval: (interval) => `elk meetpunt om de ${interval}`,
   houseLast: (age) => `laatste meting ${age} geleden`,

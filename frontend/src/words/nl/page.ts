@@ -46,7 +46,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     clock_stopped:
       'Daar haalt de digital twin zijn tijd vandaan, maar die staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_doubted:
-      'Die loopt achter op de vastgelegde gegevens. Tot de klok goed staat, hooguit tien minuten, is onbekend hoe oud de meetwaarden zijn en wacht het vastleggen.',
+      'Die loopt achter op de vastgelegde gegevens. Tot de klok gelijk is gezet, hooguit tien minuten, is onbekend hoe oud de meetwaarden zijn en wordt er niets vastgelegd.',
     clock_ahead: 'Die loopt voor op het archief; hoe oud de meetwaarden zijn, is onbekend.',
     never_seen:
       'De server heeft nog niets van een digital twin ontvangen. Staat de digital twin aan?',
@@ -71,7 +71,8 @@ export const PAGE: In<typeof EN.PAGE> = {
       : `${count} berichten van de server waren onleesbaar en zijn genegeerd.`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of opname is gepauzeerd; de meetwaarden worden niet ouder.',
-  mixture: 'Er zendt meer dan één digital twin. De pagina toont een mengsel: stop alle op één na.',
+  mixture:
+    'Meer dan één digital twin stuurt gegevens. De pagina toont ze door elkaar: stop alle op één na.',
   inputProblem: 'Een deel van de gegevens komt niet aan.',
   drops: (count) =>
     `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} niet verwerkt.`,
@@ -169,7 +170,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpGlobal: 'Overal',
   helpMap: 'Op de kaart',
   helpTime: 'Op de tijdbalk',
-  helpToggle: 'Sneltoetsen van één toets',
+  helpToggle: 'Sneltoetsen met één toets',
   keys: {
     global: [
       ['1 tot 9', 'Een sensor kiezen'],

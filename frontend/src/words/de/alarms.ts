@@ -133,8 +133,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     must: {
-      below: (limit) => `muss über ${limit} steigen`,
-      above: (limit) => `muss unter ${limit} sinken`,
+      below: (limit) => `gut erst über ${limit}`,
+      above: (limit) => `gut erst unter ${limit}`,
     },
     just: {
       below: (limit) => `knapp unter ${limit}`,

@@ -22,7 +22,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when) => `desde ${when}`,
-  alarmForOver: (length) => `hace más de ${length}`,
+  alarmForOver: (length) => `más de ${length}`,
   alarmUntil: (from, until, length) => `de ${from} a ${until} (${length})`,
   alarmNow: (reading) => `ahora ${reading}`,
   alarmNowUnknown: (last, age) =>

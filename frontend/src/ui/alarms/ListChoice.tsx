@@ -91,10 +91,9 @@ export function AlarmsLabel(): JSX.Element {
     <>
       {worst && <HealthShape verdict={worst} />}
       <span>
-        {S.alarms}
+        {S.alarms}{' '}
         {hasAny && (
           <span data-testid="alarm-count" aria-hidden="true">
-            {' '}
             ({isNow ? count : S.alarmsNow(count)})
           </span>
         )}

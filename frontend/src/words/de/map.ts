@@ -55,7 +55,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendOld: 'Blass und schraffiert: Messwerte zu alt',
   readoutOld: 'Messwerte zu alt',
   heat: 'Heatmap zeigt',
-  heats: { nearest: 'Nächstgelegene Messwerte', estimate: 'Schätzung', error: 'Unsicherheit' },
+  heats: { nearest: 'Messwerte', estimate: 'Schätzung', error: 'Unsicherheit' },
   partMissing: 'Dieser Teil der Seite konnte nicht geladen werden. Bitte die Seite neu laden.',
   colouring: 'Farben nach',
   colourings: { ideal: 'Ideal', value: 'Wert' },

@@ -54,7 +54,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendOld: 'Pálido y rayado: lecturas demasiado antiguas',
   readoutOld: 'lecturas demasiado antiguas',
   heat: 'El mapa de calor muestra',
-  heats: { nearest: 'Lecturas más cercanas', estimate: 'Estimación', error: 'Incertidumbre' },
+  heats: { nearest: 'Lecturas', estimate: 'Estimación', error: 'Incertidumbre' },
   partMissing: 'No se pudo cargar esta parte de la página. Recargue la página.',
   colouring: 'Colores según',
   colourings: { ideal: 'Ideal', value: 'Valor' },

@@ -53,7 +53,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendOld: 'Bleek en gearceerd: meetwaarden te oud',
   readoutOld: 'meetwaarden te oud',
   heat: 'Heatmap toont',
-  heats: { nearest: 'Dichtstbijzijnde waarden', estimate: 'Schatting', error: 'Onzekerheid' },
+  heats: { nearest: 'Meetwaarden', estimate: 'Schatting', error: 'Onzekerheid' },
   partMissing: 'Dit deel van de pagina kon niet worden geladen. Laad de pagina opnieuw.',
   colouring: 'Kleuren naar',
   colourings: { ideal: 'Ideaal', value: 'Waarde' },

@@ -13,14 +13,7 @@ import {
 } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
-import {
-  dayFormat,
-  hasDate,
-  secondsOf,
-  secondsSince,
-  shortRosText,
-  type When,
-} from '../domain/time';
+import { ageSeconds, dayFormat, hasDate, secondsOf, shortRosText, type When } from '../domain/time';
 import { S } from '../strings';
 import type { Item } from './list';
 
@@ -146,7 +139,7 @@ const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: WireTime 
 /** Since when; at least how long, if it may be older than `known`. */
 export function sinceText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
   const from = secondsOf(alarm.raised_at);
-  const length = nowS === null ? null : secondsSince(from, nowS);
+  const length = ageSeconds(from, nowS);
   return length !== null && isOlder(alarm, known)
     ? S.alarmForOver(lengthText(length))
     : S.alarmSince(whenText(from, nowS));
@@ -157,7 +150,7 @@ export function lengthOf(alarm: Alarm, nowS: number | null, known: WireTime | nu
   const { raised_at, cleared_at } = alarm;
   const from = secondsOf(raised_at);
   if (cleared_at) return lengthText(secondsOf(cleared_at) - from);
-  const length = nowS === null ? null : secondsSince(from, nowS);
+  const length = ageSeconds(from, nowS);
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
   return length === null || !isOfToday || isOlder(alarm, known) ? '' : lengthText(length);
 }

@@ -168,7 +168,6 @@ const tag = (id: string, x: number, said: Parameters<typeof readings>[0]): Tag =
         readings({ [name]: value }, name === 'co2' ? 50 : 100),
       ),
     }),
-    { at: { sec: 100, nanosec: 0 }, takenAt: 0 },
   );
 const row = { width: 4, height: 1, originX: 0, originY: 0, resolution: 1 };
 

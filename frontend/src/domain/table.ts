@@ -147,7 +147,7 @@ export function tableCsv(
   rows: readonly Row[],
   catalogue: Catalogue,
   sensors: readonly Sensor[],
-  /** When the state was taken, ms on the monotonic clock; ages are as of then. */
+  /** Ages are as of then, ROS seconds. */
   now: number,
 ): string {
   const header: Cell[] = [

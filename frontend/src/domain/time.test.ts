@@ -14,15 +14,19 @@ import {
 
 describe('age', () => {
   test('is the time since the observation', () => {
-    expect(ageSeconds(-3_000, 3_500)).toBe(6.5);
+    expect(ageSeconds(97, 103.5)).toBe(6.5);
   });
 
-  test('is never negative', () => {
-    expect(ageSeconds(1_000, 900)).toBe(0);
+  test('is never negative: messages overtake each other', () => {
+    expect(ageSeconds(1_005, 1_000)).toBe(0);
   });
 
-  test('a tag that nobody observed has none', () => {
-    expect(ageSeconds(null, 1_000)).toBeNull();
+  test.each([
+    ['that nobody observed', 'never', 1_000],
+    ['far ahead, of a clock that was set back', 2_000, 1_000],
+    ['as of a time that is not known', 1_000, null],
+  ] as const)('a tag %s has none', (_, at, now) => {
+    expect(ageSeconds(at, now)).toBeNull();
   });
 });
 

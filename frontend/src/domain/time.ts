@@ -8,38 +8,15 @@ const FADE_FROM_S = 60;
 const FADE_TO_S = 1800;
 const FAINTEST = 0.35;
 
-/**
- * How ages develop: with the browser's clock; not at all, as of one (past) moment, ms on the monotonic
- * clock; or unknown.
- */
-export type Ageing =
-  | { readonly kind: 'growing' }
-  | { readonly kind: 'as-of'; readonly at: number }
-  | { readonly kind: 'unknown' };
-
-export const GROWING: Ageing = { kind: 'growing' };
-export const AGES_UNKNOWN: Ageing = { kind: 'unknown' };
-
-/** A time, ms on the monotonic clock. */
+/** A time, ROS seconds. */
 export type When = number | 'never' | 'unknown';
-
-/** Seconds since then; null: never, or not known. */
-export function ageSeconds(
-  observedAt: When | null,
-  now: number,
-  ageing: Ageing = GROWING,
-): number | null {
-  if (typeof observedAt !== 'number' || ageing.kind === 'unknown') return null;
-  const asOf = ageing.kind === 'as-of' ? ageing.at : now;
-  return Math.max(0, asOf - observedAt) / 1000;
-}
 
 /** A stamp may be this far ahead of the latest state, which comes after it, seconds. */
 const AHEAD_S = 10;
 
-/** Seconds since a moment; null: it is in the future, because the clock was set back. */
-export const secondsSince = (at: number, now: number): number | null =>
-  at > now + AHEAD_S ? null : Math.max(0, now - at);
+/** Seconds since then; null: never, not known, or in the future, because the clock was set back. */
+export const ageSeconds = (at: When | null, now: number | null): number | null =>
+  typeof at !== 'number' || now === null || at > now + AHEAD_S ? null : Math.max(0, now - at);
 
 /** Age steps for text, which cannot fade as a picture does. */
 export function ageStep(age: number | null): 'fresh' | 'fading' | 'old' {

@@ -1,7 +1,7 @@
 import type { Latest, TagHealth, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { Shared } from './memo';
-import { secondsSince, type When } from './time';
+import { secondsOf, type When } from './time';
 
 export interface FailedAttempt {
   readonly at: When;
@@ -31,18 +31,6 @@ function pointOf(point: WirePoint): MapPoint | null {
   return point.x === null || point.y === null ? null : mapPoint(point.x, point.y);
 }
 
-type TakenState = Pick<Snapshot, 'at' | 'takenAt'>;
-
-/**
- * A ROS time on the monotonic clock: the wall clock would be wrong in simulation, and on a tablet whose
- * clock is off. Unknown if the state has no time of its own (0), or if the time is in the future.
- */
-export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
-  if (at.sec === 0 && at.nanosec === 0) return 'unknown';
-  const age = secondsSince(time.sec - at.sec + (time.nanosec - at.nanosec) / 1e9, 0);
-  return age === null ? 'unknown' : takenAt - age * 1000;
-}
-
 /** Below it the bridge judges by the ranges for all species: the twin's `sure_species`. */
 const SURE = 0.5;
 
@@ -50,10 +38,15 @@ const SURE = 0.5;
 const sureSpeciesOf = (wire: TwinTagState, judged?: TagHealth): string =>
   judged?.species || ((wire.species_confidence ?? 0) >= SURE ? wire.species : '');
 
-export function tagOf(wire: TwinTagState, state: TakenState, judged?: TagHealth) {
+export function tagOf(wire: TwinTagState, judged?: TagHealth) {
   const { position, orientation } = wire.pose;
+  const isObserved = wire.stale_seconds !== null;
   const readAt = new Map(
-    wire.readings.map((reading): [string, When] => [reading.name, readAtOf(wire, reading, state)]),
+    wire.readings.map(({ name, observed_at: at }): [string, When] => [
+      name,
+      // Without the tag's age, the ages of its readings are unknown.
+      isObserved && at ? secondsOf(at) : 'unknown',
+    ]),
   );
   const { looked_at: inspected, last_try: attempted, last_try_status: status } = wire;
   return {
@@ -71,14 +64,14 @@ export function tagOf(wire: TwinTagState, state: TakenState, judged?: TagHealth)
     /** When the newest reading was taken. */
     scannedAt: newest(readAt.values()),
     /** When the flowers were last inspected; "never" also if the twin does not report it. */
-    inspectedAt: inspected === null ? 'never' : whenOf(inspected, state),
+    inspectedAt: (inspected === null ? 'never' : secondsOf(inspected)) as When,
     /** The last scan or inspection, if it failed. */
     failedAttempt:
       attempted === null || status === null || status === 0
         ? null
-        : ({ at: whenOf(attempted, state), status, detail: wire.last_try_detail } as FailedAttempt),
+        : ({ at: secondsOf(attempted), status, detail: wire.last_try_detail } as FailedAttempt),
     /** Whether it was ever observed, with a known age. */
-    isObserved: wire.stale_seconds !== null,
+    isObserved,
     species: wire.species,
     speciesConfidence: wire.species_confidence,
     sureSpecies: sureSpeciesOf(wire, judged),
@@ -95,13 +88,6 @@ export function tagOf(wire: TwinTagState, state: TakenState, judged?: TagHealth)
   };
 }
 
-/** Without the tag's age, the ages of its readings are unknown. */
-const readAtOf = (
-  { stale_seconds: age }: TwinTagState,
-  { observed_at: at }: TwinTagState['readings'][number],
-  state: TakenState,
-): When => (age === null || at == null ? 'unknown' : whenOf(at, state));
-
 /** The latest of some times; "unknown" if all are, "never" without any. */
 function newest(times: Iterable<When>): When {
   let latest: When = 'never';
@@ -112,31 +98,13 @@ function newest(times: Iterable<When>): When {
   return latest;
 }
 
-/** Smaller differences in age come from network delay, not from a new observation. */
-const JITTER_MS = 1_500;
-
-/**
- * The previous tag if only its age has grown: the page renders only what changed. If the twin's clock
- * runs at another speed (simulation), its ages still win.
- */
-function sharedTag(
-  before: Tag | undefined,
-  wire: TwinTagState,
-  state: TakenState,
-  judged?: TagHealth,
-): Tag {
-  const isSame = (name: string, now: When): boolean => {
-    const known = before?.readAt.get(name);
-    return typeof known === 'number' && typeof now === 'number'
-      ? Math.abs(now - known) < JITTER_MS
-      : known === now;
-  };
+/** The previous tag if only its age has grown: the page renders only what changed. */
+function sharedTag(before: Tag | undefined, wire: TwinTagState, judged?: TagHealth): Tag {
   const isShared =
     before?.isObserved === (wire.stale_seconds !== null) &&
     before.sureSpecies === sureSpeciesOf(wire, judged) &&
-    equal(wire, before.wire) &&
-    wire.readings.every((reading) => isSame(reading.name, readAtOf(wire, reading, state)));
-  return isShared ? before : tagOf(wire, state, judged);
+    equal(wire, before.wire);
+  return isShared ? before : tagOf(wire, judged);
 }
 
 /** Deep equality of plain JSON values, except ages. */
@@ -165,17 +133,17 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   const at = latest.state.header.stamp;
   const isRepeated = before !== null && equal(before.at, at);
   const takenAt = isRepeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
-  const state = { at, takenAt };
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
   const judged = latest.health.tags;
   const read = latest.state.tags.map((wire) =>
-    sharedTag(known.get(wire.tag_id), wire, state, judged[wire.tag_id]),
+    sharedTag(known.get(wire.tag_id), wire, judged[wire.tag_id]),
   );
   const tags = inOrder(read, known, before?.tags ?? []);
   return {
     tags,
     revision: latest.revision,
-    ...state,
+    at,
+    takenAt,
     isWhole: latest.isWhole ?? true,
   };
 }

@@ -1,6 +1,5 @@
 import { describe, expect, test } from 'vitest';
 
-import { GROWING } from '../domain/time';
 import { houseHealth } from '../domain/health';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
@@ -20,8 +19,8 @@ const scene = (
     tags,
     health: houseHealth(tags, health, true),
     sensor: sensorNamed(sensor),
-    now,
-    ageing: GROWING,
+    // From ms since the state of these tags.
+    now: 105 + now / 1_000,
     listed,
   });
 

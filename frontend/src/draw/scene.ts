@@ -1,6 +1,6 @@
 /** What to draw, derived from the data: lists of pins, blooms and boxes. Pure. */
 import type { Verdict } from '../contract/types';
-import { ageSeconds, freshness, type Ageing } from '../domain/time';
+import { ageSeconds, freshness } from '../domain/time';
 import { readingText } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne, type Shared } from '../domain/memo';
@@ -31,9 +31,8 @@ export interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;
-  /** ms on the monotonic clock. */
-  readonly now: number;
-  readonly ageing: Ageing;
+  /** As of when ages are, ROS seconds; null: unknown. */
+  readonly now: number | null;
   /** The tags that pass the table's filter; null: all. */
   readonly listed: ReadonlySet<string> | null;
 }
@@ -66,13 +65,13 @@ function spacingOf(pins: readonly Pin[]): number {
 }
 
 function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
-  const { health, sensor, now, ageing, listed } = input;
+  const { health, sensor, now, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
   const name = readingOf(sensor, tag.readings);
   const value = tag.readings.get(name);
   const isLacking = value === undefined;
   const isFailed = value === null;
-  const fresh = freshness(ageSeconds(tag.readAt.get(name) ?? tag.scannedAt, now, ageing));
+  const fresh = freshness(ageSeconds(tag.readAt.get(name) ?? tag.scannedAt, now));
   const verdict: Verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
   const isWarning = isBad(verdict);
   return {

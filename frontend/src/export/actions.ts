@@ -31,7 +31,7 @@ export function saveTable(): void {
     selectRows(state),
     selectCatalogue(state),
     selectColumns(state),
-    snapshot.takenAt,
+    secondsOf(snapshot.at),
   );
   saveCsv('tags', text, epochOf(snapshot.takenAt), moment);
 }

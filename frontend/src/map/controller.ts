@@ -22,7 +22,7 @@ import {
   selectRange,
   selectSensor,
 } from '../store/derived';
-import { selectLatest, selectShown, selectTag } from '../store/moment';
+import { selectHasTime, selectLatest, selectShown, selectTag } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
@@ -137,7 +137,7 @@ export function runMap(
       changedTags ||
       stillChanged ||
       house.health !== last.health ||
-      house.ageing !== last.ageing ||
+      selectHasTime(state) !== selectHasTime(before) ||
       state.settings !== before.settings ||
       selectListed(state) !== selectListed(before)
     )

@@ -55,13 +55,13 @@ import {
   type Heat,
 } from '../store/derived';
 import { retainEqual, memoLast, memoOne } from '../domain/memo';
-import { selectShown, selectTag, selectTags } from '../store/moment';
+import { selectShown, selectTag, selectTags, shownTime } from '../store/moment';
 import type { MapPicture } from '../geometry/image';
 
 export type Canvases = Readonly<Record<'still' | 'pins' | 'overlay', HTMLCanvasElement>>;
 
-/** Fading is recomputed this often, ms, even if nothing else changes. */
-const FADE_TICK_MS = 5_000;
+/** Fading is recomputed this often, seconds, even if nothing else changes. */
+const FADE_TICK_S = 5;
 
 const edges = memoOne(edgesOf);
 const knownPart = memoOne(knownOf);
@@ -251,14 +251,14 @@ export class Painter {
   }
 
   scene(state: AppState, now: number): Scene {
+    const at = shownTime(state, now);
     return this.#scene(
       this.#sceneInput({
         tags: selectTags(state),
-        ageing: selectShown(state).ageing,
         health: selectHealth(state),
         sensor: selectSensor(state),
         listed: selectListed(state),
-        now: Math.floor(now / FADE_TICK_MS) * FADE_TICK_MS,
+        now: at && Math.floor(at / FADE_TICK_S) * FADE_TICK_S,
       }),
     );
   }

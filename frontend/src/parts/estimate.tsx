@@ -27,11 +27,11 @@ import { shown } from '../domain/text';
 import { ageSeconds, type When } from '../domain/time';
 import type { Tag } from '../domain/twin';
 import { type MapPoint, mapPoint, toCanvas } from '../geometry/coordinates';
-import { useApp } from '../store/app';
+import { store, useApp } from '../store/app';
 import { selectCatalogue, selectHealth, selectHeat, selectSensor } from '../store/derived';
 import { keepClear } from '../store/create';
 import { type Fetched, useFetched } from '../store/fetcher';
-import { selectShown, selectTags } from '../store/moment';
+import { selectShown, selectTags, shownTime } from '../store/moment';
 import { LANGUAGE, S } from '../strings';
 import { More } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
@@ -127,10 +127,9 @@ export function EstimateReadout({
   const sensor = useApp(selectSensor);
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
-  const ageing = useApp((state) => selectShown(state).ageing);
   const { count, oldest } = nearTo(point, tags, sensor.name, health);
   const age = useTicking((now) => {
-    const seconds = ageSeconds(oldest, now, ageing);
+    const seconds = ageSeconds(oldest, shownTime(store.get(), now));
     return seconds === null ? null : ageText(seconds);
   });
   const sd = field.sureness?.sd[cellAt(field, point) ?? -1] ?? NaN;

@@ -8,10 +8,10 @@ import type { Robot, RobotNow, WireTime } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
-import { act, type AppState, keepFetched, store, useApp } from '../store/app';
+import { act, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { keepClear, robotFrame, useSelected } from '../store/create';
-import { isReceivingNow, rosNow, selectLatest, selectShown } from '../store/moment';
+import { isReceivingNow, latestTime, selectLatest } from '../store/moment';
 import { S } from '../strings';
 import { Check } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
@@ -26,7 +26,7 @@ export function RobotLayer(): ReactPortal | null {
   const isReceiving = useApp(isReceivingNow);
   const trail = useTrail();
   const ageAt = (now: number): number | null =>
-    position && ageOf(position.observed_at, timeOf(store.get(), now));
+    position && ageOf(position.observed_at, latestTime(store.get(), now));
   const age = useTicking((now) => {
     const known = ageAt(now);
     return known === null ? null : ageText(known);
@@ -124,7 +124,7 @@ export function robotText({ position, battery }: RobotNow, time: number | null):
 
 export function RobotFact(): JSX.Element | null {
   const robot = useRobot();
-  const text = useTicking((now) => robotText(robot, timeOf(store.get(), now)));
+  const text = useTicking((now) => robotText(robot, latestTime(store.get(), now)));
   if (!robot.position && !robot.battery) return null;
   return (
     <span className="robot-fact" data-testid="robot-fact">
@@ -142,14 +142,10 @@ const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 
 export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame ?? NOTHING);
 
-/** The twin's time, ROS seconds; null: ages are unknown. */
-const timeOf = (state: AppState, now: number): number | null =>
-  selectShown(state).ageing.kind === 'unknown' ? null : rosNow(state, now);
-
 /** Age in seconds; null: unknown. */
 export function ageOf(stamp: WireTime, time: number | null): number | null {
   const at = secondsOf(stamp);
-  return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);
+  return at === 0 ? null : ageSeconds(at, time);
 }
 
 /** Pause between attempts to fetch the trail, ms. */

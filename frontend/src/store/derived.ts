@@ -35,7 +35,14 @@ import {
 import { equal, type Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { retainEqual, memoLast, memoOne } from '../domain/memo';
-import { isReceivingNow, selectIsReceiving, selectLatest, selectShown, selectTags } from './moment';
+import {
+  isReceivingNow,
+  selectIsReceiving,
+  selectLatest,
+  selectShown,
+  selectTags,
+  shownTime,
+} from './moment';
 import { boundsOf } from '../geometry/coordinates';
 import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
@@ -46,12 +53,12 @@ const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
 
 export function selectHealth(state: AppState): HouseHealth {
-  const { health, ageing } = selectShown(state);
+  const { health } = selectShown(state);
   return healthShown(
     selectTags(state),
     health,
     selectIsReceiving(state),
-    ageing.kind !== 'unknown',
+    shownTime(state, 0) !== null,
   );
 }
 

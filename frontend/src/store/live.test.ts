@@ -8,7 +8,7 @@ import { status } from '../testing/page';
 import { NOBODY } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { store } from './app';
-import { selectShown } from './moment';
+import { selectShown, shownTime } from './moment';
 import { pauseMs, retryConnection, startLive } from './live';
 
 class FakeSocket {
@@ -142,10 +142,9 @@ describe('a machine that slept for an hour', () => {
   const HOUR = 3_600_000;
   // A new stamp per test: a repeated state keeps its age.
   let sec = 100_000;
-  const ageing = (): string => selectShown(store.get()).ageing.kind;
   const age = (): number | null => {
-    const { snapshot, ageing: how } = selectShown(store.get());
-    return ageSeconds(snapshot?.tags[0]?.scannedAt ?? null, now(), how);
+    const { snapshot } = selectShown(store.get());
+    return ageSeconds(snapshot?.tags[0]?.scannedAt ?? null, shownTime(store.get(), now()));
   };
   const wake = (): void => {
     // The wall clock went on, the monotonic one stood still.
@@ -170,13 +169,13 @@ describe('a machine that slept for an hour', () => {
   test('shows no age and no “Live” before a fresh state has come', () => {
     const before = FakeSocket.count;
     wake();
-    expect([ageing(), age()]).toEqual(['unknown', null]);
+    expect(age()).toBeNull();
     expect(store.get().twin.phase).toBe('reconnecting');
     expect(FakeSocket.count).toBe(before + 1);
     FakeSocket.last.onopen?.();
-    expect([ageing(), store.get().twin.phase]).toEqual(['unknown', 'reconnecting']);
+    expect([age(), store.get().twin.phase]).toEqual([null, 'reconnecting']);
     FakeSocket.last.speak(status());
-    expect([ageing(), store.get().twin.phase]).toEqual(['unknown', 'reconnecting']);
+    expect([age(), store.get().twin.phase]).toEqual([null, 'reconnecting']);
     FakeSocket.last.speak(stateFrame([scannedAt(sec - 5)], { sec: sec + 3_600 }));
     expect([age(), store.get().twin.phase]).toEqual([3_605, 'live']);
   });
@@ -199,7 +198,7 @@ describe('a machine that slept for an hour', () => {
     // Its own timer is the first to read the clock.
     vi.advanceTimersByTime(300);
     expect(revision()).not.toBe('waits');
-    expect(ageing()).toBe('unknown');
+    expect(age()).toBeNull();
   });
 });
 

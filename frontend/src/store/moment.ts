@@ -4,7 +4,7 @@
  */
 import { now } from '../clock';
 import type { StatusFrame } from '../contract/types';
-import { type Ageing, AGES_UNKNOWN, GROWING, secondsOf, type Span, spanOf } from '../domain/time';
+import { secondsOf, type Span, spanOf } from '../domain/time';
 import { DAY_S } from '../domain/difference';
 import { memoLast, memoOne } from '../domain/memo';
 import type { Snapshot, Tag } from '../domain/twin';
@@ -15,7 +15,6 @@ import type { House, Past, TwinState } from './twin';
 export interface Shown extends House {
   /** Null: now. */
   readonly moment: number | null;
-  readonly ageing: Ageing;
 }
 
 /**
@@ -24,7 +23,7 @@ export interface Shown extends House {
  * another time.
  */
 export function shownAt(twin: TwinState, moment: number | null): Shown {
-  if (moment === null || twin.past === null) return shownNow(twin.latest)(clockOf(twin));
+  if (moment === null || twin.past === null) return shownNow(twin.latest);
   const { at, house } = twin.past;
   return shownThen(house, twin.latest.map, at);
 }
@@ -45,23 +44,13 @@ function clockOf({ isTimeLost, connection, phase }: TwinState): Clock {
   return phase === 'live' ? 'paused' : 'unknown';
 }
 
-const shownNow = memoOne((house: House) =>
-  memoLast((clock: Clock): Shown => {
-    // While the twin's time stands still, ages do too.
-    const ageing = { running: GROWING, unknown: AGES_UNKNOWN, paused: asTaken(house) }[clock];
-    return { ...house, moment: null, ageing };
-  }),
-);
-
-const asTaken = ({ snapshot }: House): Ageing => ({ kind: 'as-of', at: snapshot?.takenAt ?? 0 });
+const shownNow = memoOne((house: House): Shown => ({ ...house, moment: null }));
 
 const shownThen = memoLast((house: House, map: House['map'], moment: number): Shown => ({
   ...house,
   // The map has no history; walls and benches stay where they are.
   map,
   moment,
-  // At a past moment, each reading has one fixed age.
-  ageing: asTaken(house),
 }));
 
 export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, view.moment);
@@ -104,6 +93,16 @@ export function rosNow({ twin }: AppState, at: number): number | null {
   if (taken === 0) return null;
   const goesOn = clockOf(twin) === 'running';
   return goesOn ? taken + Math.max(0, at - snapshot.takenAt) / 1000 : taken;
+}
+
+/** The same; null also if it is in doubt: then nothing has an age. */
+export const latestTime = (state: AppState, at: number): number | null =>
+  selectHasTime(state) ? rosNow(state, at) : null;
+
+/** As of when ages are shown, ROS seconds: of now, or of the state at a past moment; null: unknown. */
+export function shownTime(state: AppState, at: number): number | null {
+  const { moment, snapshot } = selectShown(state);
+  return moment === null ? latestTime(state, at) : snapshot && secondsOf(snapshot.at);
 }
 
 /**

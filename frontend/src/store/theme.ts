@@ -1,35 +1,38 @@
+import { timeOfDay } from '../clock';
 import { onChange, store } from './app';
+import { createStore } from './create';
 
 const system = window.matchMedia('(prefers-color-scheme: dark)');
 const forced = window.matchMedia('(forced-colors: active)');
-let printing = false;
+
+/**
+ * Since when the page is being printed, ms since the epoch; null: it is not. Components that use it
+ * render before the browser takes the page: such an update does not wait for a frame.
+ */
+export const printing = createStore<number | null>(null);
+
+window.addEventListener('beforeprint', () => printing.set(timeOfDay()));
+window.addEventListener('afterprint', () => printing.set(null));
 
 /** On paper the pointer leaves no mark. */
-export function isPrinting(): boolean {
-  return printing;
-}
+export const isPrinting = (): boolean => printing.get() !== null;
 
 export function isDark(): boolean {
-  if (printing) return false;
+  if (isPrinting()) return false;
   const { theme } = store.get().settings;
   return theme === 'system' ? system.matches : theme === 'dark';
 }
 
 /** Calls back whenever the colours may have changed; paper is always light. */
 export function onThemeChange(listener: () => void): () => void {
-  const onPrint = ({ type }: Event): void => {
-    printing = type === 'beforeprint';
-    listener();
-  };
-  const stop = onChange(({ settings }) => [settings.theme], listener);
+  const stops = [
+    onChange(({ settings }) => [settings.theme], listener),
+    printing.subscribe(listener),
+  ];
   for (const query of [system, forced]) query.addEventListener('change', listener);
-  window.addEventListener('beforeprint', onPrint);
-  window.addEventListener('afterprint', onPrint);
   return () => {
-    stop();
+    for (const stop of stops) stop();
     for (const query of [system, forced]) query.removeEventListener('change', listener);
-    window.removeEventListener('beforeprint', onPrint);
-    window.removeEventListener('afterprint', onPrint);
   };
 }
 
@@ -37,7 +40,7 @@ export function startTheme(): () => void {
   const apply = (): void => {
     const root = document.documentElement;
     root.dataset['theme'] = isDark() ? 'dark' : 'light';
-    root.toggleAttribute('data-printing', printing);
+    root.toggleAttribute('data-printing', isPrinting());
   };
   apply();
   return onThemeChange(apply);

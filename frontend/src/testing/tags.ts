@@ -24,8 +24,7 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
   };
 }
 
-export const tag = (over: Partial<TwinTagState> = {}): Tag =>
-  tagOf(wireTag(over), { at: { sec: 105, nanosec: 0 }, takenAt: 0 });
+export const tag = (over: Partial<TwinTagState> = {}): Tag => tagOf(wireTag(over));
 
 export const readings = (
   values: Record<string, number | null>,

@@ -2,14 +2,13 @@ import type { JSX } from 'react';
 
 import { DAY_S } from '../domain/difference';
 import { ageText, intervalText } from '../domain/format';
-import { rosText, secondsSince } from '../domain/time';
+import { ageSeconds, rosText } from '../domain/time';
 import { store, useApp } from '../store/app';
 import {
   backToLive,
+  latestTime,
   ownTime,
-  rosNow,
   selectDayS,
-  selectHasTime,
   selectIsRecorded,
   selectOrigin,
   selectShown,
@@ -23,12 +22,10 @@ export function PastHeader(): JSX.Element | null {
   const isLooking = useApp((state) => state.view.moment !== null);
   // Without the twin's time, it is unknown how long ago.
   const ago = useTicking((now) => {
-    const nowS = rosNow(store.get(), now);
-    const since = nowS === null || moment === null ? null : secondsSince(moment, nowS);
+    const since = ageSeconds(moment, latestTime(store.get(), now));
     return since === null ? null : ageText(since);
   });
   const origin = useApp(selectOrigin);
-  const hasTime = useApp(selectHasTime);
   if (moment === null || !isLooking) return null;
   return (
     <div className="past-header" data-testid="past-header">
@@ -41,7 +38,7 @@ export function PastHeader(): JSX.Element | null {
       )}
       <strong>{rosText(moment)}</strong>
       {/* A running count must not be read out every second. */}
-      {ago !== null && hasTime && (
+      {ago !== null && (
         <span className="past-ago" aria-hidden="true">
           {S.agoSuffix(ago)}
         </span>

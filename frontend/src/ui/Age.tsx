@@ -5,8 +5,8 @@ import { ageText } from '../domain/format';
 import { shown } from '../domain/text';
 import { attemptOutcome } from '../domain/health';
 import type { FailedAttempt } from '../domain/twin';
-import { useApp } from '../store/app';
-import { selectShown } from '../store/moment';
+import { store, useApp } from '../store/app';
+import { selectHasTime, selectShown, shownTime } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 
@@ -14,20 +14,24 @@ type Format = (seconds: number) => string;
 
 const agoText: Format = (seconds) => S.agoSuffix(ageText(seconds));
 
-/** The age as text, counting on where the shown moment does; null: unknown. */
-function useAgeText(when: When, format: Format): string | null {
-  const ageing = useApp((state) => selectShown(state).ageing);
-  return useTicking((now) => {
-    const age = ageSeconds(when, now, ageing);
-    return age === null ? null : format(age);
-  });
+/** What follows from the time as of which ages are shown (`shownTime`); it ticks. */
+export function useShownTime<Part extends string | null>(part: (at: number | null) => Part): Part {
+  // Only what can jump renders anew: each state sets the time.
+  useApp((state) => selectShown(state).moment);
+  useApp(selectHasTime);
+  return useTicking((now) => part(shownTime(store.get(), now)));
 }
 
+/** The age as text, counting on where the shown moment does; null: unknown. */
+const useAgeText = (when: When, format: Format): string | null =>
+  useShownTime((at) => {
+    const age = ageSeconds(when, at);
+    return age === null ? null : format(age);
+  });
+
 /** Age step, for styling. */
-export function useAgeStep(when: When): ReturnType<typeof ageStep> {
-  const ageing = useApp((state) => selectShown(state).ageing);
-  return useTicking((now) => ageStep(ageSeconds(when, now, ageing)));
-}
+export const useAgeStep = (when: When): ReturnType<typeof ageStep> =>
+  useShownTime((at) => ageStep(ageSeconds(when, at)));
 
 /** An age whose seconds tick in here, so that a table of hundreds of rows does not re-render. */
 export function Age({ when, format = agoText }: { when: When; format?: Format }): JSX.Element {

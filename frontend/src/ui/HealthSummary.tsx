@@ -2,13 +2,12 @@ import type { JSX } from 'react';
 
 import { ageText, intervalText, numberText } from '../domain/format';
 import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
-import { ageSeconds } from '../domain/time';
-import { whenOf } from '../domain/twin';
+import { ageSeconds, secondsOf } from '../domain/time';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
-import { selectClockFault, selectHasSnapshot, selectShown } from '../store/moment';
+import { selectClockFault, selectHasSnapshot, selectIsPaused, selectShown } from '../store/moment';
 import { S } from '../strings';
-import { useTicking } from '../widgets/useNow';
+import { useShownTime } from './Age';
 import { DoNow, Overall, ShelvedCount } from './DoNow';
 import { HealthMark, HealthShape } from './HealthMark';
 
@@ -75,21 +74,21 @@ const LATE_ROUNDS = 1.5;
 export function HouseLine(): JSX.Element | null {
   const health = useApp(selectHealth);
   const { patrol } = health;
-  const { snapshot, ageing } = useApp(selectShown);
+  const { snapshot, moment } = useApp(selectShown);
+  const isPaused = useApp(selectIsPaused);
   const interval = patrol?.interval_s ?? null;
-  const ageOf = (now: number): number | null =>
-    patrol?.last_scan && snapshot
-      ? ageSeconds(whenOf(patrol.last_scan, snapshot), now, ageing)
-      : null;
-  const last = useTicking((now) => {
-    const age = ageOf(now);
+  const ageAt = (at: number | null): number | null =>
+    patrol?.last_scan ? ageSeconds(secondsOf(patrol.last_scan), at) : null;
+  const last = useShownTime((at) => {
+    const age = ageAt(at);
     return age === null ? null : ageText(age);
   });
   // In the past, or while the clock is paused, nobody can check on the robot.
-  const isLate = useTicking((now) =>
+  const isLate = useShownTime((at) =>
     interval !== null &&
-    ageing.kind === 'growing' &&
-    (ageOf(now) ?? 0) > Math.max(LATE_S, LATE_ROUNDS * interval)
+    moment === null &&
+    !isPaused &&
+    (ageAt(at) ?? 0) > Math.max(LATE_S, LATE_ROUNDS * interval)
       ? 'late'
       : null,
   );

@@ -1,15 +1,16 @@
-import { useEffect, useState, type JSX } from 'react';
-import { flushSync } from 'react-dom';
+import type { JSX } from 'react';
 
 import { epochOf, timeOfDay } from '../clock';
 import { dateText, rosText, secondsOf } from '../domain/time';
 import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
 import { selectHasOwnTime, selectOrigin, selectShown, selectSnapshot } from '../store/moment';
+import { printing } from '../store/theme';
 import { S } from '../strings';
 
 /** Printed only: as of when; the legend says what is shown. "Live" and "5 s" mean nothing an hour later. */
 export function PaperLine(): JSX.Element | null {
-  const [printedAt, setPrintedAt] = useState(() => timeOfDay());
+  const printedAt = useSelected(printing) ?? timeOfDay();
   const takenAt = useApp((state) => selectSnapshot(state)?.takenAt);
   const moment = useApp((state) => selectShown(state).moment);
   const origin = useApp(selectOrigin);
@@ -18,14 +19,6 @@ export function PaperLine(): JSX.Element | null {
     const snapshot = selectHasOwnTime(state) ? selectSnapshot(state) : null;
     return snapshot && secondsOf(snapshot.at);
   });
-  useEffect(() => {
-    const onPrint = (): void => {
-      // Render synchronously: a page being printed gets no further frame.
-      flushSync(() => setPrintedAt(timeOfDay()));
-    };
-    window.addEventListener('beforeprint', onPrint);
-    return () => window.removeEventListener('beforeprint', onPrint);
-  }, []);
   if (takenAt === undefined) return null;
   const then = moment ?? ownAt;
   // Data may still arrive while the print dialog is open.

@@ -4,15 +4,14 @@ import { alarmOf, isAwaited } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { isOldReading, type TagThen } from '../domain/difference';
-import { ageSeconds, type When } from '../domain/time';
+import { ageSeconds, secondsOf, type When } from '../domain/time';
 import { byCause, causeText, todoText } from '../domain/health';
-import { whenOf } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectCatalogue, selectHealth } from '../store/derived';
-import { selectIsReceiving, selectShown, selectTag } from '../store/moment';
+import { selectIsReceiving, selectTag } from '../store/moment';
 import { S } from '../strings';
-import { useTicking } from '../widgets/useNow';
+import { useShownTime } from './Age';
 import { HealthShape } from './HealthMark';
 
 /** Reasons of one cause in words, with the age at the shown moment of what they are about. */
@@ -22,21 +21,18 @@ export function useCauseText(
   /** Empty: the greenhouse. */
   tagId = '',
 ): string {
-  const { snapshot, ageing } = useApp(selectShown);
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const isReceiving = useApp(selectIsReceiving);
   const catalogue = useApp(selectCatalogue);
-  return useTicking((now) => {
+  return useShownTime((at) => {
     const [reason] = reasons;
     if (!reason) return '';
     const when =
       tag && health
         ? whenShown(reason, { tag, health }, isReceiving)
-        : reason.since && snapshot
-          ? whenOf(reason.since, snapshot)
-          : 'unknown';
-    return causeText(catalogue, reasons, ageSeconds(when, now, ageing), isMarked);
+        : reason.since && secondsOf(reason.since);
+    return causeText(catalogue, reasons, ageSeconds(when, at), isMarked);
   });
 }
 

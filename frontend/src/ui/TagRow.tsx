@@ -179,12 +179,12 @@ function TableReading(cell: CellProps): JSX.Element {
   );
 }
 
-/** Readings further apart than this come from different scans, ms. */
-const ONE_SCAN_MS = 60_000;
+/** Readings further apart than this come from different scans, seconds. */
+const ONE_SCAN_S = 60;
 
 const isOlder = (when: When, row: When): boolean =>
   when !== 'never' &&
-  (typeof when === 'number' && typeof row === 'number' ? row - when > ONE_SCAN_MS : when !== row);
+  (typeof when === 'number' && typeof row === 'number' ? row - when > ONE_SCAN_S : when !== row);
 
 function Reading({ sensor, row: { tag, health }, look }: CellProps): JSX.Element {
   const value = tag.readings.get(sensor.name);

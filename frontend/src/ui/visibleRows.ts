@@ -1,10 +1,11 @@
 /** Windowing of a long table: renders the rows in view, some around them, and a few others. */
 import { useEffect, useMemo, useState, type RefObject } from 'react';
-import { flushSync } from 'react-dom';
 
 import { inAreas, withHeads, type Line, type Row } from '../domain/table';
 import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
 import { selectAreaOf, selectRows } from '../store/derived';
+import { printing } from '../store/theme';
 
 /** Up to this many rows, all are rendered. */
 export const SHORT_TABLE = 100;
@@ -108,22 +109,7 @@ export function useVisibleRows(
 }
 
 /** Whether the page is being printed. */
-export function usePaper(): boolean {
-  const [isPaper, setPaper] = useState(false);
-  useEffect(() => {
-    const onPrint = ({ type }: Event): void => {
-      // Render synchronously: a page being printed gets no further frame.
-      flushSync(() => setPaper(type === 'beforeprint'));
-    };
-    window.addEventListener('beforeprint', onPrint);
-    window.addEventListener('afterprint', onPrint);
-    return () => {
-      window.removeEventListener('beforeprint', onPrint);
-      window.removeEventListener('afterprint', onPrint);
-    };
-  }, []);
-  return isPaper;
-}
+export const usePaper = (): boolean => useSelected(printing, (since) => since !== null);
 
 /**
  * Scrolls the selected row into view once its card is laid out, and again once rows are measured:

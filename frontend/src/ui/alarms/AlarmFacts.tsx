@@ -19,7 +19,13 @@ import { useSelected } from '../../store/create';
 import { selectKnownSince } from '../../alarms/latest';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
 import { selectCatalogue } from '../../store/derived';
-import { isReceivingNow, rosNow, selectClockFault, selectHasTime } from '../../store/moment';
+import {
+  isReceivingNow,
+  latestTime,
+  rosNow,
+  selectClockFault,
+  selectHasTime,
+} from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
@@ -169,9 +175,10 @@ function NotKnown({
   hasLast: boolean;
 }): JSX.Element {
   const sensors = useApp(selectCatalogue);
-  const hasTime = useApp(selectHasTime);
+  // After a lapse no age is known, at once.
+  useApp(selectHasTime);
   const text = useTicking((at) =>
-    unknownText(alarm, sensors, state, hasTime ? ageSeconds(state.lastAt, at) : null),
+    unknownText(alarm, sensors, state, ageSeconds(state.lastAt, latestTime(store.get(), at))),
   );
   return (
     // Never more lines than a known value: then no row grows.

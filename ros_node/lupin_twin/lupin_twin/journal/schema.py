@@ -45,7 +45,8 @@ LOCAL_SITE: Final = "local"
 TABLES: Final = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
 WRITTEN: Final = ("scan", "look")
 
-# A commit has a few scans, and writes whole pages: this size was measured to write fewest bytes.
+# A commit has a few scans, and writes whole pages: small ones. With 512 bytes, each row over 102
+# bytes would need a further page, such as a scan of five readings with all digits.
 PAGE_SIZE: Final = 1024
 
 # {key}: a clause that only SQLite has. {months}: PostgreSQL partitions large tables by month of the

@@ -212,11 +212,11 @@ describe.each([
     expect(texts.filter((text) => foreign.test(text.replaceAll(/⟦\w+⟧/g, '')))).toEqual([]);
     const leftover = /\b(the|and|with|not|readings?|shown)\b/i;
     expect(texts.filter((text) => leftover.test(text.replaceAll(/⟦\w+⟧/g, '')))).toEqual([]);
-    // Literal translations that no grower says, and second words for the ideal range.
+    // Literal translations that no grower says, and second words for the ideal range or for low.
     const translated = {
-      de: /Sollbereich|Typischer Fehler|Vergangen|Was die Zeichen/,
-      nl: /gestrest|Typische fout|verleden|[Vv]raagt aandacht| …/i,
-      es: /Error típico|calentar|\(?pasado|anomalía| …/i,
+      de: /Sollbereich|Typischer Fehler|Vergangen|Was die Zeichen|niedrig/,
+      nl: /gestrest|Typische|ideale? bereik|ideaal bereik|verleden|[Vv]raagt aandacht| …/i,
+      es: /Error típico|calentar|\(?pasado|anomalía|gemelo (?!digital|y el puente|inactivo)| …/i,
     }[language];
     expect(texts.filter((text) => translated.test(text))).toEqual([]);
     // For any sensor: an adjective that agrees with one noun disagrees with another.

@@ -230,9 +230,9 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     `Soweit bekannt kein Handlungsbedarf; keine Daten von ${counted(unknown, 'Messpunkt', 'Messpunkten')}`,
   attentionMore: (count) => `+ ${counted(count, 'weiterer', 'weitere')}`,
 
-  tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
+  tooLow: (by) => (by === null ? 'zu tief' : `um ${by} zu tief`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
-  side: { below: 'niedrig', above: 'hoch' },
-  below: 'zu niedrig',
+  side: { below: 'tief', above: 'hoch' },
+  below: 'zu tief',
   above: 'zu hoch',
 };

@@ -126,8 +126,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     must: {
-      below: (limit) => `moet boven ${limit} komen`,
-      above: (limit) => `moet onder ${limit} komen`,
+      below: (limit) => `moet boven ${limit}`,
+      above: (limit) => `moet onder ${limit}`,
     },
     just: {
       below: (limit) => `net onder ${limit}`,

@@ -221,8 +221,8 @@ class Bridge:
         yield "lupin_frames_sent", hub.frames_sent
         yield "lupin_frames_skipped", hub.frames_skipped
         yield "lupin_bytes_sent", hub.bytes_sent
-        yield "lupin_messages_sent", self.offer.counts.sent
-        yield "lupin_messages_skipped", self.offer.counts.skipped + source.relay.skipped
+        yield "lupin_messages_sent", source.relay.sent
+        yield "lupin_messages_skipped", source.relay.skipped
         yield "lupin_ros_thread_alive", source.thread.is_alive
         yield "lupin_ros_calls_waiting", source.thread.calls_waiting
         yield "lupin_ros_callback_errors", source.thread.callback_errors

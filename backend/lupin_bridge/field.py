@@ -340,8 +340,8 @@ _SDS_OF_IDEAL: Final = 6.0
 
 def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
     """The estimate, known only where its 90 % interval is at most about half the ideal range."""
-    spans = [ranges.ideal for ranges in (sensor.day, sensor.night) if ranges.ideal is not None]
-    limit = min((span.width for span in spans), default=math.inf) / _SDS_OF_IDEAL
+    spans = [sensor.by(is_day=is_day).ideal for is_day in (True, False)]
+    limit = min((it.width for it in spans if it is not None), default=math.inf) / _SDS_OF_IDEAL
     grid = estimate.grid
     if not limit < grid.sd_known:
         return estimate

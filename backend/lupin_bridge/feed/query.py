@@ -38,7 +38,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import latest
 from lupin_twin.journal.writes import Export, lots, notes, observed, recent, scans, writes
-from lupin_twin.runtime.journal_queries import Recall, Search
+from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop, Workers
 
 if TYPE_CHECKING:
@@ -139,16 +139,34 @@ HEAD: Final = struct.Struct(">QQ")
 NICENESS: Final = 5
 
 
+# Answers a query that refers to `Now`, in a worker's thread; calls `should_stop` between its steps.
+Answerer = Callable[[Any, Now, ShouldStop], Any]
+
+
+class FromJournal:
+    """An `Answerer`: answers from the twin's journal, wherever that is at the newest query."""
+
+    def __init__(self) -> None:
+        self._condition = UNKNOWN_JOURNAL
+        self._recall = Recall(lambda: self._condition)
+
+    def __call__(self, query: PastQuery[ResultT], now: Now, should_stop: ShouldStop) -> ResultT:
+        """Answer a query."""
+        self._condition = now.condition
+        return self._recall.answer(
+            lambda connection, stop: query(LogReader(connection, now, stop)), should_stop
+        )
+
+
 class Child:
-    """Answers queries until its input ends; `recall` runs them on the log, in worker threads.
+    """Answers queries until its input ends, in worker threads.
 
     The input is pairs of a number and a query, pickled with its `Now` and its cost; or None, which
     cancels the query of that number.
     """
 
-    def __init__(self, recall: type[Recall] = Recall) -> None:
-        self._condition = UNKNOWN_JOURNAL
-        self._recall = recall(lambda: self._condition)
+    def __init__(self, answer: Answerer) -> None:
+        self._answer = answer
         self._workers = Workers("memory")
         self._running: dict[int, Future[Any]] = {}
         self._sending = threading.Lock()
@@ -172,17 +190,12 @@ class Child:
     def _ask(self, number: int, message: bytes) -> None:
         try:
             query, now, cost_s = pickle.loads(message)  # noqa: S301  # as above
-            search = self._search(query, now)
         except Exception as error:  # noqa: BLE001  # goes to the caller
             self._send(number, True, error)
             return
-        self._condition = now.condition
-        running = self._workers.submit(partial(self._recall.answer, search), cost_s)
+        running = self._workers.submit(partial(self._answer, query, now), cost_s)
         self._running[number] = running
         running.add_done_callback(partial(self._reply, number))
-
-    def _search(self, query: PastQuery[Any], now: Now) -> Search[Any]:
-        return lambda connection, should_stop: query(LogReader(connection, now, should_stop))
 
     # --- in a worker's thread -------------------------------------------------------------------
 
@@ -211,7 +224,7 @@ def _portable(error: BaseException) -> BaseException:
     return portable
 
 
-def main(child: Callable[[], Child] = Child) -> None:
+def main(answerer: Callable[[], Answerer] = FromJournal) -> None:
     """Answer the parent until it ends, for whatever reason."""
     # Only the parent acts on Ctrl-C and on a service manager's signal to all processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -222,7 +235,7 @@ def main(child: Callable[[], Child] = Child) -> None:
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)
         try:
-            child().run(sys.stdin.buffer, answers)
+            Child(answerer()).run(sys.stdin.buffer, answers)
         finally:
             # At once: nobody waits for queries under way, and there is nothing to clean up.
             os._exit(0)

@@ -115,6 +115,15 @@ class Bounded:
         return sample
 
 
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """A client's subscription to a topic, which the client calls `name`."""
+
+    topic: Topic
+    name: str | int
+    min_interval_s: float = 0.0
+
+
 class _Relayed:
     """One relayed topic: its samples and its listeners."""
 
@@ -147,8 +156,9 @@ class Relay:
         self._thread = thread
         self._ros = ros
         self.linger_s = LINGER_S
-        # Samples that were too large, or dropped before the loop had taken them.
-        self.skipped = 0
+        # Samples that viewers got unchanged; and those that were too large, or dropped before the
+        # loop or a slow client had taken them.
+        self.sent = self.skipped = 0
         self.topics: dict[Topic, _Relayed] = {}
         self._closing: set[asyncio.Task[None]] = set()
 

@@ -1,4 +1,4 @@
-"""The process that reads the sites' logs: `query.Child`, over the archive in place of a journal.
+"""The process that reads the sites' logs, in the archive in place of a journal.
 
 One process answers for all open sites. A query has the name of its site in place of a journal's
 path. Every SQL query of the log has its site as `:site`, and works with both engines: a `SiteLog`
@@ -11,7 +11,7 @@ import logging
 from concurrent.futures import CancelledError
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from lupin_bridge.archive.database import (
     CHANNEL,
@@ -21,7 +21,7 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, LogReader, Now, PastQuery
+from lupin_bridge.feed.query import LogReader, Now, PastQuery
 from lupin_bridge.feed.query import main as serve
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
@@ -35,10 +35,7 @@ from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
 from lupin_twin.journal.writes import put_note
-from lupin_twin.runtime.journal_queries import Recall, Search
 from lupin_twin.runtime.workers import ShouldStop
-
-AnswerT = TypeVar("AnswerT")
 
 # A map is identified by a hash of its text, which is the same in all replicas.
 _NEWER_MAP: Final = (
@@ -69,29 +66,16 @@ class Reported:
     occupancy_map: OccupancyMap | None
 
 
-class ArchiveChild(Child):
-    """Answers queries about sites."""
-
-    def __init__(self) -> None:
-        super().__init__(ArchiveRecall)
-
-    def _search(self, query: PastQuery[Any] | Note, now: Now) -> Search[Any]:
-        site = now.condition.path
-        if isinstance(query, Note):
-            return lambda _, stop: _write_note(site, query, stop)
-        found = super()._search(query, now)
-        return lambda connection, stop: found(SiteLog(connection, site), stop)
-
-
 def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
     """Write a note into a site's log, at the primary; returns it with its id.
 
     Raises:
-        ArchiveError: there is no archive that can be written; `psycopg.Error`: it refuses.
+        ArchiveError: there is no archive that can be written, or it refuses.
         CancelledError: nobody waits for it any more, and it is not written.
 
     """
     with (
+        explaining(),
         closing(connect(archive_url(), "lupin-twin fleet")) as connection,
         connection.transaction(),
     ):
@@ -144,16 +128,22 @@ def _newer_map(log: SiteLog, known: int) -> tuple[int, OccupancyMap | None]:
         return found, None
 
 
-class ArchiveRecall(Recall):
-    """Queries the archive, each query in a transaction, over pooled connections."""
+class FromArchive:
+    """An `Answerer` from the archive, each query in a transaction, over pooled connections."""
 
-    def answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
-        """See `Recall`."""
+    def __init__(self) -> None:
+        self._idle: list[Any] = []
+
+    def __call__(self, query: PastQuery[Any] | Note, now: Now, should_stop: ShouldStop) -> Any:
+        """Answer a query of a site, or write a note into its log."""
+        site = now.condition.path
         try:
+            if isinstance(query, Note):
+                return _write_note(site, query, should_stop)
             connection = self._connection()
             try:
                 with explaining(), connection.transaction():
-                    return query(connection, is_abandoned)
+                    return query(LogReader(SiteLog(connection, site), now, should_stop))
             except ArchiveError:
                 connection.close()
                 raise
@@ -182,4 +172,4 @@ class ArchiveRecall(Recall):
 
 def main() -> None:
     """Answer the parent until it ends."""
-    serve(ArchiveChild)
+    serve(FromArchive)

@@ -91,7 +91,7 @@ class Watching:
     async def _look(self) -> News:
         """Wait for news; if they take too long, report that meanwhile."""
         about = Now(0, "", UNKNOWN_JOURNAL)
-        settings: Any = self._settings  # see `WatchChild`
+        settings: Any = self._settings  # see `FromWatcher`
         look: asyncio.Task[News] = asyncio.create_task(self.process.ask(settings, about, 0.0))
         try:
             patience_s = STUCK_S if self.looks else START_S

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.archive.database import (
@@ -21,7 +21,7 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed.query import Child, LogReader, Now
+from lupin_bridge.feed.query import LogReader, Now
 from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
 from lupin_bridge.judge.alarm_fold import AlarmLog
@@ -44,12 +44,9 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.journal.writes import notes, writes
-from lupin_twin.runtime.journal_queries import Recall, Search
 from lupin_twin.runtime.workers import ShouldStop
 
 log = logging.getLogger(__name__)
-
-AnswerT = TypeVar("AnswerT")
 
 # A forwarder's notification wakes it at once; that may be lost, so it polls too.
 POLL_S: Final = 2.0
@@ -379,17 +376,14 @@ class News:
     changed: Sequence[Site]
 
 
-class WatchChild(Child):
-    """Answers each query, which is the settings to judge by, with the changes since the last."""
+class FromWatcher:
+    """An `Answerer`: a query is the settings to judge by."""
 
     def __init__(self) -> None:
-        super().__init__(_WithoutJournal)
         self._watcher: Watcher | None = None
 
-    def _search(self, query: Any, now: Now) -> Search[Any]:  # noqa: ARG002  # it is of now
-        return lambda *_: self._look(query)
-
-    def _look(self, settings: Settings) -> News:
+    def __call__(self, settings: Settings, _now: Now, _should_stop: ShouldStop) -> News:
+        """What has changed since the last query."""
         try:
             with explaining():
                 if self._watcher is None:
@@ -403,13 +397,7 @@ class WatchChild(Child):
             raise NotRemembered(str(error)) from error
 
 
-class _WithoutJournal(Recall):
-    def answer(self, query: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
-        """See `Recall`."""
-        return query(None, is_abandoned)
-
-
 def main() -> None:
     """Answer the parent until it ends."""
     logging.getLogger("psycopg").setLevel(logging.CRITICAL)
-    serve(WatchChild)
+    serve(FromWatcher)

@@ -24,12 +24,14 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import ROUND_HALF_UP, Decimal
 from functools import cached_property
 from math import ceil, log10
 from operator import itemgetter
-from typing import Final
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+from annotated_types import Interval, MaxLen, MinLen
 
 from lupin_twin.core.past import DAY_NS, HOUR_NS
 
@@ -215,12 +217,19 @@ DAILY: Final[Mapping[str, Daily]] = {
 # --- sensors --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
+# What pydantic accepts in a file: limits in the sensor's unit, shares in percent, short texts.
+Limit = Annotated[float, Interval(ge=-1e9, le=1e9)]
+Share = Annotated[float, Interval(ge=0, le=100)]
+Name = Annotated[str, MaxLen(64)]
+# The page's languages other than English, whose text is `label`.
+Language = Literal["de", "es", "nl"]
+
+
+class Span(NamedTuple):
     """From `low` to `high`, both included, in the sensor's unit."""
 
-    low: float
-    high: float
+    low: Limit
+    high: Limit
 
     @property
     def width(self) -> float:
@@ -235,27 +244,53 @@ class Ranges:
     `critical` None: no value is critical. `ideal` None: no value is judged.
     """
 
-    ideal: Span | None = None
+    ideal: Span | None
     critical: Span | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse impossible ranges."""
+        for name in ("ideal", "critical", "plausible"):
+            span = getattr(self, name, None)
+            if span is not None and not span.low < span.high:
+                raise ValueError(f"{name} is {[*span]}, and low must be less than high")
+        if self.critical is not None:
+            if self.ideal is None:
+                raise ValueError("critical is given, but no ideal range")
+            if not self.critical.low <= self.ideal.low <= self.ideal.high <= self.critical.high:
+                raise ValueError(f"critical is {[*self.critical]}, inside ideal {[*self.ideal]}")
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
-    """One sensor. Hue in degrees, lightness in percent (HSL); `unit` is empty where not known.
+class DayAndNight(Ranges):
+    """The ranges of the day, and those of the night; None: those of the day."""
 
-    A working sensor never reads a value outside `plausible`, so such a value is not a reading;
-    None: any value may be one. `species` maps lower-case names to the ranges of day and night.
+    night: Ranges | None = None
+
+    def by(self, *, is_day: bool) -> Ranges:
+        """The ranges of day or night."""
+        return self if is_day or self.night is None else self.night
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor(DayAndNight):
+    """One sensor as the file has it. Hue in degrees, lightness in percent (HSL).
+
+    `unit` is empty where not known. A working sensor never reads a value outside `plausible`, so
+    such a value is not a reading; None: any value may be one. `source` is that of these numbers.
+    `derived` names the sensors that it is computed from. `name` is that of its entry, and
+    `species` has lower-case names, once `sensors_file` has read them.
     """
 
-    name: str
-    label: str
-    unit: str
-    hue: float
-    lightness: float
-    day: Ranges = Ranges()
-    night: Ranges = Ranges()
-    species: Mapping[str, tuple[Ranges, Ranges]] = field(default_factory=dict)
+    name: Annotated[str, MaxLen(0)] = ""
+    label: Name
+    unit: Name
+    hue: Annotated[float, Interval(ge=0, le=360)]
+    lightness: Share
+    labels: dict[Language, Annotated[Name, MinLen(1)]] = field(default_factory=dict)
+    derived: tuple[Name, ...] = ()
     plausible: Span | None = None
+    source: str = ""
+    species: dict[str, DayAndNight] = field(default_factory=dict)
 
     def is_plausible(self, value: float) -> bool:
         """Whether a working sensor can read this: a finite number within `plausible`."""
@@ -266,13 +301,13 @@ class Sensor:
     @property
     def ideals(self) -> tuple[Span, ...]:
         """All ideal ranges, of day, night and species."""
-        ranges = (self.day, self.night, *(one for both in self.species.values() for one in both))
+        every = (self, *self.species.values())
+        ranges = (it.by(is_day=is_day) for it in every for is_day in (True, False))
         return tuple(each.ideal for each in ranges if each.ideal is not None)
 
     def ranges(self, *, is_day: bool, species: str = "") -> Ranges:
         """The ranges at a tag with this species; for an unknown one, the general ranges."""
-        day, night = self.species.get(species.lower(), (self.day, self.night))
-        return day if is_day else night
+        return self.species.get(species.lower(), self).by(is_day=is_day)
 
 
 @dataclass(frozen=True)
@@ -303,7 +338,10 @@ class Sensors:
         if known is not None:
             return known
         other = self.fallback
-        return Sensor(name, other.label or name, other.unit, other.hue, other.lightness)
+        no_ranges: dict[str, Any] = {"ideal": None, "critical": None, "night": None, "species": {}}
+        return replace(
+            other, name=name, label=other.label or name, labels={}, plausible=None, **no_ranges
+        )
 
     def text_of(self, name: str, value: float) -> str:
         """A value as the page writes it in English, without its unit; empty: it is not finite.

@@ -40,7 +40,6 @@ from lupin_bridge.notify.messages import (
     Source,
     Topics,
     alarms_payload,
-    expire_after_s,
     greenhouse_configs,
     greenhouse_payload,
     health_payload,
@@ -66,9 +65,8 @@ class _Published:
     """What was published of a tag or the greenhouse: a digest for each topic."""
 
     digests: dict[str, bytes] = field(default_factory=dict)
-    # What its messages were made of, and its announcements.
+    # What its messages were made of; and the topics of its announcements.
     made_of: object = None
-    announced: object = None
     configs: frozenset[str] = frozenset()
     # When the first of its readings becomes too old.
     until_ns: int = _NEVER
@@ -124,7 +122,9 @@ class Mirror:
         published = self._published.setdefault(key, _Published())
         # With the data's origin, so that nobody is called for a simulation.
         states = ((topic, {**it, "origin": self._seen.origin}) for topic, it in said)
-        for topic, payload in chain(self._announced(tag, published), states):
+        configs = self._announced(tag)
+        published.configs = frozenset(configs)
+        for topic, payload in chain(configs.items(), states):
             text = orjson.dumps(payload)
             digest = hashlib.blake2b(text, digest_size=16).digest()
             if published.digests.get(topic) != digest:
@@ -162,25 +162,16 @@ class Mirror:
     def _holds_ns(self, tag_id: str) -> int:
         return self._seen.holds_ns.get(tag_id, SHORTEST_NS)
 
-    def _announced(
-        self, tag: TagState | None, published: _Published
-    ) -> Iterable[tuple[str, dict[str, Any]]]:
-        """The announcements; none if nothing that they are made of has changed."""
-        if not self._topics.discovery:
-            return ()
-        readings = () if tag is None else (*tag.readings, *derive(tag.readings))
-        names = tuple(reading.name for reading in readings)
-        holds_ns = 0 if tag is None else self._holds_ns(tag.tag_id)
-        if published.announced == (names, expire_after_s(holds_ns)):
-            return ()
-        published.announced = names, expire_after_s(holds_ns)
+    def _announced(self, tag: TagState | None) -> dict[str, dict[str, Any]]:
+        """The announcements of a tag's entities, or the greenhouse's (None), by their topics."""
+        topics = self._topics
+        if not topics.discovery:
+            return {}
         if tag is None:
-            configs = dict(greenhouse_configs(self._topics))
-        else:
-            sensors = [self._sensors.named(name) for name in names]
-            configs = dict(tag_configs(self._topics, tag.tag_id, sensors, holds_ns))
-        published.configs = frozenset(configs)
-        return configs.items()
+            return dict(greenhouse_configs(topics))
+        readings = (*tag.readings, *derive(tag.readings))
+        sensors = [self._sensors.named(reading.name) for reading in readings]
+        return dict(tag_configs(topics, tag.tag_id, sensors, self._holds_ns(tag.tag_id)))
 
 
 # --- the connection -------------------------------------------------------------------------------
@@ -231,11 +222,6 @@ class Mqtt:
         """Publish from now on."""
         self._look = source.seen
         self._task = asyncio.create_task(self._run(), name="mqtt")
-
-    @property
-    def called(self) -> str:
-        """The broker, and the prefix of the topics there."""
-        return f"{self._target.called} {self._topics.prefix}"
 
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
         """Send a report until it is taken; False: it was given up, which is logged."""

@@ -172,11 +172,6 @@ class Webhook:
             self._waiting.put_nowait(delivery)
             self.condition.waiting += 1
 
-    @property
-    def called(self) -> str:
-        """Its address, which may be a secret."""
-        return f"{self._target.called}{self._target.path}"
-
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
         """Send a report until it is taken; False: it was given up, which is logged."""
         return await self._send(report_id, {"change": "report", "report": report})

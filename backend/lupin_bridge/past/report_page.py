@@ -85,8 +85,6 @@ class PageText:
         self.words = _words()[lang]
         self._criteria = criteria
         self._day = ""
-        named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
-        self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
     def page(self, body: Entry, origin: Origin, site: str) -> str:
         """The whole page, of the body of a report."""
@@ -343,7 +341,9 @@ class PageText:
         return text.replace("{sensor}", self._label(sensor))
 
     def _label(self, sensor: str) -> str:
-        return self._labels.get(sensor) or self._criteria.sensors.named(sensor).label
+        found = self._criteria.sensors.named(sensor)
+        own = (text for language, text in found.labels.items() if language == self._lang)
+        return next(own, found.label)
 
     def _where(self, tag_id: str) -> str:
         return self.say("house") if tag_id in (SITE, "site") else self.say("tag", name=tag_id)

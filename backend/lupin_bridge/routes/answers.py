@@ -368,26 +368,35 @@ async def on_worker(
 
 
 async def computed(
-    request: Request,
+    bridge: Bridge,
+    client: str,
     key: Hashable,
-    write: Callable[[], bytes],
-    media_type: str,
-    *,
-    cost_s: float = 0.0,
-    headers: Mapping[str, str] = NEVER_STORE,
+    write: Callable[[ShouldStop], Answer],
+    cost_s: float,
 ) -> Answer:
     """The answer that `write` makes on a worker, put into the cache.
 
     Raises:
         BusyError: one computation too many.
+        Exception: whatever `write` raised.
 
     """
-    bridge = bridge_of(request)
-    with bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S) as times:
-        body = await on_worker(bridge, lambda _: write(), cost_s * times)
-    answer = Answer(body, media_type, headers)
+    with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times:
+        answer = await on_worker(bridge, write, cost_s * times)
     bridge.cache.put(key, answer)
     return answer
+
+
+async def respond_computed(
+    request: Request,
+    key: Hashable,
+    write: Callable[[ShouldStop], Answer],
+    cost_s: float,
+    etag: str | None = None,
+) -> Response:
+    """`respond` with an answer that is `computed`."""
+    bridge, client = bridge_of(request), client_of(request)
+    return await respond(request, key, lambda: computed(bridge, client, key, write, cost_s), etag)
 
 
 # --- answers of the past --------------------------------------------------------------------------

@@ -25,10 +25,10 @@ from lupin_bridge.routes.answers import (
     REFUSALS,
     ApiRoute,
     bridge_of,
+    computed,
     json_response,
     list_header,
     newest_of,
-    on_worker,
     read_route,
     refusal,
     refusing,
@@ -41,7 +41,6 @@ from lupin_bridge.stream import pollers, routes_schema, schema
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report
-from lupin_twin.runtime.workers import SMALL_S
 
 router = APIRouter(route_class=ApiRoute)
 
@@ -156,18 +155,14 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
         lupin_twin.field.engine.FieldRefused: a bad request.
 
     """
-    snapshot = newest_of(bridge)
+    snapshot, occupancy = newest_of(bridge), bridge.source.occupancy_map()
     cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
-    with (
-        bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times,
-        bridge.metrics.field_seconds.time(),
-    ):
-        occupancy = bridge.source.occupancy_map()
-        answer = await on_worker(
-            bridge, lambda stop: field.plan(snapshot, etag, occupancy).write(stop), cost_s * times
+    with bridge.metrics.field_seconds.time():
+        return await computed(
+            *(bridge, client, etag),
+            lambda stop: field.plan(snapshot, etag, occupancy).write(stop),
+            cost_s,
         )
-    bridge.cache.put(etag, answer)
-    return answer
 
 
 async def _answer(request: Request, field_format: FieldFormat | None) -> Response:

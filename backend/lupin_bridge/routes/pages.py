@@ -22,17 +22,16 @@ from lupin_bridge.field import listed
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     ApiRoute,
-    computed,
     error_response,
     json_response,
     list_header,
     person_of,
     read_body,
     read_route,
-    respond,
+    respond_computed,
     while_client_waits,
 )
-from lupin_bridge.serving.admission import REVALIDATE
+from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream import routes_schema
 
 router = APIRouter(route_class=ApiRoute)
@@ -62,21 +61,16 @@ async def openapi(request: Request) -> Response:
     app, prefix = request.app, request.scope.get("root_path", "")
     key = f"openapi {prefix}"
 
-    def write() -> bytes:
+    def write(_: object) -> Answer:
         document = app.openapi()
         if prefix:
             document = {**document, "servers": [{"url": prefix}]}
-        return orjson.dumps(document, option=orjson.OPT_INDENT_2)
+        body = orjson.dumps(document, option=orjson.OPT_INDENT_2)
+        return Answer(body, "application/json", REVALIDATE)
 
     if app.state.bridge is None:
-        return Response(write(), headers=REVALIDATE, media_type="application/json")
-    return await respond(
-        request,
-        key,
-        lambda: computed(
-            request, key, write, "application/json", cost_s=_WRITE_S, headers=REVALIDATE
-        ),
-    )
+        return json_response(write(None).body, headers=REVALIDATE)
+    return await respond_computed(request, key, write, _WRITE_S)
 
 
 # --- the guide -----------------------------------------------------------------------------------

@@ -1,8 +1,7 @@
 """The sockets of viewers: `/foxglove`, and `/rosbridge` for roslib clients.
 
-Foxglove and Lichtblick read the twin's topics as ROS has them on the wire. A slow client gets the
-newest message of each channel. The bridge reads nothing more from a client that has not taken the
-answer to its last message.
+Foxglove and Lichtblick read the twin's topics as ROS has them on the wire. The bridge reads nothing
+more from a client that has not taken the answer to its last message.
 
 A roslib client reads the twin as it would through rosbridge. A connection may have `MAX_OPEN_CALLS`
 calls open, of which `MAX_RUNNING_CALLS` run at once; others wait. A call ends with `result` false
@@ -17,17 +16,16 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import ExitStack
-from functools import partial
+from dataclasses import replace
 from typing import Any, Final, Protocol
 
 from fastapi import APIRouter, WebSocket
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.relay import NotRelayedError, Sample
+from lupin_bridge.feed.relay import Bounded, Feed, NotRelayedError, Relay, Sample
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
@@ -41,14 +39,16 @@ from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
 from lupin_bridge.stream.schema import GetFieldResponse
 from lupin_bridge.viewers.foxglove import (
     SUBPROTOCOLS,
-    Channel,
-    Reaction,
     Session,
-    error_status,
+    message_head,
     server_info,
 )
-from lupin_bridge.viewers.rosbridge_protocol import FieldCall, service_failure, service_response
-from lupin_bridge.viewers.rosbridge_session import Feeds
+from lupin_bridge.viewers.rosbridge_protocol import (
+    FieldCall,
+    service_failure,
+    service_response,
+    status,
+)
 from lupin_bridge.viewers.rosbridge_session import Session as RosbridgeSession
 from lupin_twin.field.engine import FieldRefused
 
@@ -107,6 +107,60 @@ async def listen(websocket: WebSocket, to: _Listened, **options: Any) -> None:
         to.hub.leave(client)
 
 
+class Feeds:
+    """The topics of one client: each is a task that waits for the client and never for another.
+
+    `send(feed, sample)` writes a sample once the client can take it. Meanwhile others wait, bounded
+    by the topic: the newest map, the newest 50 observations; of a throttled topic, the newest one.
+    `refuse(feed, why)` reports a topic that cannot be listened to.
+    """
+
+    def __init__(
+        self,
+        relay: Relay,
+        send: Callable[[Feed, Sample], Awaitable[None]],
+        refuse: Callable[[Feed, str], Awaitable[None]],
+    ) -> None:
+        self._relay, self._send, self._refuse = relay, send, refuse
+        self._tasks: dict[str | int, tuple[Feed, asyncio.Task[None]]] = {}
+
+    def follow(self, feeds: Iterable[Feed], renewed: str | None = None) -> None:
+        """Run exactly these feeds; those that were refused, and the `renewed` one, start again."""
+        wanted = {feed.name: feed for feed in feeds}
+        for name, (feed, task) in list(self._tasks.items()):
+            if wanted.get(name) != feed or name == renewed or task.done():
+                task.cancel()
+                del self._tasks[name]
+        for name in wanted.keys() - self._tasks.keys():
+            feed = wanted[name]
+            task = asyncio.create_task(self._run(feed), name=f"feed {feed.topic.name}")
+            self._tasks[name] = (feed, task)
+
+    async def _run(self, feed: Feed) -> None:
+        waiting = Bounded(replace(feed.topic, depth=1) if feed.min_interval_s else feed.topic)
+        has_come = asyncio.Event()
+
+        def take(sample: Sample) -> None:
+            self._relay.skipped += waiting.put(sample)
+            has_come.set()
+
+        try:
+            close = await self._relay.listen(feed.topic, take)
+        except (NotRelayedError, TwinUnavailableError) as error:
+            await self._refuse(feed, str(error))
+            return
+        try:
+            while True:
+                await has_come.wait()
+                has_come.clear()
+                while waiting:
+                    await self._send(feed, waiting.take())
+                    if feed.min_interval_s:
+                        await asyncio.sleep(feed.min_interval_s)
+        finally:
+            close()
+
+
 class _Conversation:
     """One client of a viewer's protocol, until it has gone."""
 
@@ -122,6 +176,8 @@ class _Conversation:
             wants_state=False,
             **options,
         )
+        self._feeds = Feeds(bridge.source.relay, self._send_sample, self._refuse)
+        self._turn = asyncio.Lock()
 
     async def run(self) -> None:
         """Serve the client until it has gone."""
@@ -134,33 +190,50 @@ class _Conversation:
         finally:
             self._connection.on_writable = None
             self._bridge.hub.leave(self._client)
-            self._end()
+            self._feeds.follow(())
 
     async def _converse(self) -> None:
+        """Answer the client's messages."""
+        while (message := await next_message(self._websocket)) is not None:
+            await self._take(message)
+            # What one client has sent at once must not hold up the others.
+            await asyncio.sleep(0)
+
+    async def _take(self, message: str | bytes) -> None:
         raise NotImplementedError
 
-    def _end(self) -> None:
+    async def _send_sample(self, feed: Feed, sample: Sample) -> None:
+        raise NotImplementedError
+
+    async def _refuse(self, feed: Feed, why: str) -> None:
         raise NotImplementedError
 
     def _on_writable(self) -> None:
-        raise NotImplementedError
+        # Here and not in the hub, which looks only when a state is due: a reply may have filled
+        # the socket.
+        self._bridge.hub.is_free(self._client)
+        self._bridge.serve(self._client)
 
     async def _send(self, message: bytes) -> None:
         await self._write_when_free(text_frame(message))
 
-    async def _write_when_free(self, frame: bytes) -> None:
+    async def _write_when_free(self, frame: bytes, rest: bytes = b"") -> None:
         """Write once the socket has taken all before; until then the client counts as blocked.
 
-        What waits counts towards the limit for all clients, see `Hub.hold`.
+        `rest` is the payload that is not in the frame. What waits counts towards the limit for all
+        clients, see `Hub.hold`.
         """
-        hub, client = self._bridge.hub, self._client
-        if not self._connection.can_take:
-            hub.hold(client, frame)
-            if client.blocked_since_s is None:
-                client.blocked_since_s = time.monotonic()
-        await self._connection.write_when_free(frame)
-        if not self._connection.can_take:
-            hub.hold(client, frame)
+        hub, client, connection = self._bridge.hub, self._client, self._connection
+        async with self._turn:
+            if not connection.can_take:
+                hub.hold(client, rest or frame)
+                if client.blocked_since_s is None:
+                    client.blocked_since_s = time.monotonic()
+            await connection.writable.wait()
+            connection.write_shared(frame, rest)
+        hub.bytes_sent += len(frame) + len(rest)
+        if not connection.can_take:
+            hub.hold(client, rest or frame)
 
 
 # --- Foxglove -------------------------------------------------------------------------------------
@@ -184,92 +257,44 @@ class _FoxgloveConversation(_Conversation):
 
     def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
         super().__init__(websocket, bridge)
-        self._offer = bridge.offer
-        self._session = Session(bridge.offer.counts)
-        # By subscription, the function that ends it.
-        self._close: dict[int, Callable[[], None]] = {}
-        # Advertisements that wait.
-        self._due: deque[bytes] = deque()
-        self._offer_is_due = False
+        self._session = Session()
 
     async def _converse(self) -> None:
-        await self._offer.look()
-        await self._send(server_info(self._offer.session_id))
-        async with self._offer.followed(self._on_change):
-            self._on_change()
-            await self._receive_all()
+        offer, has_changed = self._bridge.offer, asyncio.Event()
+        await offer.look()
+        await self._send(server_info(offer.session_id))
+        has_changed.set()
+        async with offer.followed(has_changed.set):
+            advertising = asyncio.create_task(self._advertise(has_changed))
+            await asyncio.sleep(0)  # it begins before the client's first message is taken
+            try:
+                await super()._converse()
+            finally:
+                advertising.cancel()
 
-    def _end(self) -> None:
-        for close in self._close.values():
-            close()
-
-    async def _receive_all(self) -> None:
-        while (message := await next_message(self._websocket)) is not None:
-            reaction = self._session.receive(message)
-            self._stop_listening(reaction)
-            for key, channel in reaction.begun:
-                await self._begin(key, channel)
-            for reply in reaction.replies:
+    async def _advertise(self, has_changed: asyncio.Event) -> None:
+        while True:
+            await has_changed.wait()
+            has_changed.clear()
+            replies = self._session.offer(self._bridge.offer.channels)
+            self._feeds.follow(self._session.feeds)
+            for reply in replies:
                 await self._send(reply)
-            # What one client has sent at once must not hold up the others.
-            await asyncio.sleep(0)
 
-    async def _begin(self, key: int, channel: Channel) -> None:
-        try:
-            async with asyncio.timeout(self._bridge.limits.answer_timeout_s):
-                close = await self._bridge.source.relay.listen(
-                    channel.topic, partial(self._on_sample, key)
-                )
-        except (NotRelayedError, TwinUnavailableError, TimeoutError) as error:
-            self._session.end(key)
-            text = f"channel {channel.id} cannot be served now: {str(error) or 'ROS is busy'}"
-            await self._send(error_status(text))
-            return
-        if self._session.has(key, channel):
-            self._close[key] = close
-        else:
-            close()  # the channel has gone meanwhile
+    async def _take(self, message: str | bytes) -> None:
+        replies = self._session.receive(message)
+        self._feeds.follow(self._session.feeds)
+        for reply in replies:
+            await self._send(reply)
 
-    def _stop_listening(self, reaction: Reaction) -> None:
-        for key in reaction.ended:
-            if (close := self._close.pop(key, None)) is not None:
-                close()
+    async def _send_sample(self, feed: Feed, sample: Sample) -> None:
+        head = message_head(feed, sample)
+        length = len(head) + len(sample.data)
+        await self._write_when_free(frame_head(BINARY, length) + head, sample.data)
+        self._bridge.source.relay.sent += 1
 
-    # --- what is written ------------------------------------------------------------------------
-
-    def _on_sample(self, key: int, sample: Sample) -> None:
-        self._session.put(key, sample)
-        self._write_all()
-
-    def _on_change(self) -> None:
-        self._offer_is_due = True
-        self._write_all()
-
-    def _on_writable(self) -> None:
-        self._bridge.hub.is_free(self._client)
-        self._write_all()
-
-    def _write_all(self) -> None:
-        """Write what waits, as far as the socket takes it."""
-        while self._connection.can_take:
-            if self._offer_is_due:
-                self._offer_is_due = False
-                reaction = self._session.offer(self._offer.channels)
-                self._stop_listening(reaction)
-                self._due.extend(reaction.replies)
-            elif self._due:
-                self._write(text_frame(self._due.popleft()))
-            elif (message := self._session.next()) is not None:
-                head, payload = message
-                self._write(frame_head(BINARY, len(head) + len(payload)) + head, payload)
-            else:
-                return
-
-    def _write(self, frame: bytes, rest: bytes = b"") -> None:
-        self._connection.write_shared(frame, rest)
-        self._bridge.hub.bytes_sent += len(frame) + len(rest)
-        if not self._connection.can_take:
-            self._bridge.hub.hold(self._client, rest or frame)
+    async def _refuse(self, feed: Feed, why: str) -> None:
+        await self._send(self._session.refuse(feed, why))
 
 
 # --- rosbridge ------------------------------------------------------------------------------------
@@ -293,18 +318,16 @@ class _RosbridgeConversation(_Conversation):
             bridge,
             wire=lambda _client, frame: session.wire(frame),
         )
-        self._feeds = Feeds(bridge.rosbridge_writer, self._write_when_free)
         self._calls: set[asyncio.Task[None]] = set()
         self._running = asyncio.Semaphore(MAX_RUNNING_CALLS)
 
-    async def _converse(self) -> None:
-        while (message := await next_message(self._websocket)) is not None:
-            await self._take(message)
-
-    def _end(self) -> None:
-        self._feeds.close()
-        for call in self._calls:
-            call.cancel()
+    async def run(self) -> None:
+        """See `_Conversation`; its calls end with it."""
+        try:
+            await super().run()
+        finally:
+            for call in self._calls:
+                call.cancel()
 
     async def _take(self, message: str | bytes) -> None:
         reaction = self._session.receive(message)
@@ -313,9 +336,13 @@ class _RosbridgeConversation(_Conversation):
         if reaction.field_call is not None:
             await self._open(reaction.field_call)
         self._follow_subscriptions(reaction.state_is_due)
-        self._feeds.follow(self._session.feeds, reaction.subscribed)
-        # What one client has sent at once must not hold up the others.
-        await asyncio.sleep(0)
+        self._feeds.follow(self._session.feeds.values(), reaction.subscribed)
+
+    async def _send_sample(self, feed: Feed, sample: Sample) -> None:
+        await self._write_when_free(await self._bridge.rosbridge_writer.frame(feed, sample))
+
+    async def _refuse(self, _feed: Feed, why: str) -> None:
+        await self._send(status("error", why))
 
     def _follow_subscriptions(self, state_is_due: bool) -> None:
         client = self._client
@@ -325,12 +352,6 @@ class _RosbridgeConversation(_Conversation):
             client.sent_seq = 0
             client.next_due_s = 0.0
             self._bridge.serve(client)
-
-    def _on_writable(self) -> None:
-        # Here and not in the hub, which looks only when a state is due: a reply may have filled
-        # the socket.
-        self._bridge.hub.is_free(self._client)
-        self._bridge.serve(self._client)
 
     # --- calls of GetField --------------------------------------------------------------------
 

@@ -24,7 +24,6 @@ from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     ApiRoute,
     bridge_of,
-    computed,
     error_response,
     has_etag,
     json_response,
@@ -35,6 +34,7 @@ from lupin_bridge.routes.answers import (
     refusing,
     respond,
     respond_as_of,
+    respond_computed,
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream import routes_schema, schema
@@ -145,13 +145,8 @@ async def _map(request: Request, kind: str) -> Response:
             return not_modified(etag)
         return Response(map_json(occupancy), headers=headers, media_type="application/json")
     cost_s = occupancy.cells.size * _DRAW_CELL_S
-    return await respond(
-        request,
-        etag,
-        lambda: computed(
-            request, etag, lambda: map_png(occupancy), "image/png", cost_s=cost_s, headers=headers
-        ),
-        etag,
+    return await respond_computed(
+        request, etag, lambda _: Answer(map_png(occupancy), "image/png", headers), cost_s, etag
     )
 
 
@@ -246,6 +241,7 @@ async def alarms_route(request: Request) -> Response:
         said = notes_of_alarms(board.alarms, notes, now_ns)
         return orjson.dumps(alarms_body(found, board.source, board.since_ns, said))
 
+    # Not cached: a shelf ends by time alone.
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request)):
             text = await on_worker(bridge, lambda _: body(), len(alarms) * _WRITE_ALARM_S)

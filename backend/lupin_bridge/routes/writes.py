@@ -87,7 +87,7 @@ async def notes_route(request: Request) -> Response:
     start_ns, end_ns = given.span(bridge.ros_time_ns)
     key = "notes", bridge.notes.number, given
 
-    def body(notes: tuple[Note, ...]) -> bytes:
+    def write(notes: tuple[Note, ...]) -> Answer:
         gone = withdrawals(notes)
         found = (
             note_json(note, gone)
@@ -97,11 +97,12 @@ async def notes_route(request: Request) -> Response:
             and start_ns <= note.about_ns
             and (not end_ns or note.about_ns < end_ns)
         )
-        return orjson.dumps({"notes": list(islice(found, MAX_LISTED))})
+        body = orjson.dumps({"notes": list(islice(found, MAX_LISTED))})
+        return Answer(body, "application/json", NEVER_STORE)
 
     async def compute() -> Answer:
         notes = await _known(bridge)
-        return await computed(request, key, lambda: body(notes), "application/json")
+        return await computed(bridge, client_of(request), key, lambda _: write(notes), 0.0)
 
     return await respond(request, key, compute)
 

@@ -281,14 +281,6 @@ class Connection(WebSocketsSansIOProtocol, SmallReads):
         self._pieces.extend(pieces(frame, rest))
         self._write_pieces()
 
-    async def write_when_free(self, wire: bytes) -> None:
-        """Write as soon as all before has gone out; at most one frame slips in between.
-
-        Nothing is written to a connection that is closing.
-        """
-        await self.writable.wait()
-        self.write_shared(wire)
-
     def _write_pieces(self) -> None:
         while self._pieces and not self._is_full:
             if self.close_sent or self.transport.is_closing():

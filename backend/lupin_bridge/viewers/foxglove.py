@@ -7,8 +7,7 @@ none of it is among the capabilities that `serverInfo` names. Payloads are CDR, 
 https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 
 Channels are a twin's topics, and the layers that are published now. They are looked up while there
-are clients, once for all of them. A slow client gets the newest message of each subscription next:
-older ones that could not be written are dropped.
+are clients, once for all of them.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from __future__ import annotations
 import asyncio
 import struct
 import uuid
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -26,7 +25,7 @@ from typing import Annotated, Final
 import orjson
 from pydantic import BaseModel, ConfigDict, Field
 
-from lupin_bridge.feed.relay import Sample, TwinNames, schema_text, topics_of
+from lupin_bridge.feed.relay import Feed, Sample, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.feed.tasks import Periodic, Shared
 from lupin_bridge.serving.ws_protocol import members_of, model_of, shown
@@ -101,6 +100,11 @@ def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
 # --- outgoing ---------------------------------------------------------------------------------
 
 
+def message_head(feed: Feed, sample: Sample) -> bytes:
+    """What comes before a sample's payload in a binary message."""
+    return struct.pack("<BIQ", _MESSAGE_DATA, feed.name, max(0, sample.stamp_ns))
+
+
 def server_info(session_id: str) -> bytes:
     """The first message; `session_id` changes with a restart."""
     return orjson.dumps(
@@ -143,41 +147,27 @@ def unadvertise(ids: Iterable[int]) -> bytes:
 # --- one client's session -------------------------------------------------------------------------
 
 
-@dataclass(slots=True)
-class Counts:
-    """Messages that were written to clients, and those replaced by newer ones before that."""
-
-    sent: int = 0
-    skipped: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Reaction:
-    """What a message leads to: replies, and subscriptions (id and channel) to begin or to end."""
-
-    replies: tuple[bytes, ...] = ()
-    begun: tuple[tuple[int, Channel], ...] = ()
-    ended: tuple[int, ...] = ()
-
-
 class Session:
     """The state of one connection."""
 
-    def __init__(self, counts: Counts) -> None:
-        self._counts = counts
+    def __init__(self) -> None:
         self._subscriptions: dict[int, Channel] = {}
         self._advertised: dict[int, Channel] = {}
-        self._waiting: dict[int, Sample] = {}
 
-    def receive(self, message: str | bytes) -> Reaction:
-        """Take one message from the client."""
+    @property
+    def feeds(self) -> list[Feed]:
+        """What the client is subscribed to; their names are its own ids."""
+        return [Feed(channel.topic, key) for key, channel in self._subscriptions.items()]
+
+    def receive(self, message: str | bytes) -> tuple[bytes, ...]:
+        """Take one message from the client; returns the replies."""
         try:
             begun, ended = parse(message)
         except ValueError as error:
-            return Reaction((error_status(str(error)),))
+            return (error_status(str(error)),)
         return self._unsubscribe(ended) if ended else self._subscribe(begun)
 
-    def offer(self, channels: Mapping[int, Channel]) -> Reaction:
+    def offer(self, channels: Mapping[int, Channel]) -> tuple[bytes, ...]:
         """Take the current channels; the replies offer new ones, and withdraw old ones.
 
         Subscriptions to withdrawn channels end.
@@ -190,41 +180,17 @@ class Session:
         if new or not self._advertised:
             replies.append(advertise(new))
         self._advertised = dict(channels)
-        ended = [key for key, channel in self._subscriptions.items() if channel.id in gone]
-        for key in ended:
-            self.end(key)
-        return Reaction(tuple(replies), ended=tuple(ended))
+        self._subscriptions = {
+            key: channel for key, channel in self._subscriptions.items() if channel.id not in gone
+        }
+        return tuple(replies)
 
-    def has(self, subscription_id: int, channel: Channel) -> bool:
-        """Whether this subscription is open."""
-        return self._subscriptions.get(subscription_id) is channel
+    def refuse(self, feed: Feed, why: str) -> bytes:
+        """End a subscription that cannot be served; returns the reply."""
+        channel = self._subscriptions.pop(int(feed.name))
+        return error_status(f"channel {channel.id} cannot be served now: {why}")
 
-    def end(self, subscription_id: int) -> None:
-        """End a subscription; harmless if there is none."""
-        self._subscriptions.pop(subscription_id, None)
-        self._waiting.pop(subscription_id, None)
-
-    def put(self, subscription_id: int, sample: Sample) -> None:
-        """Queue a message for a subscription, if that is open."""
-        if subscription_id not in self._subscriptions:
-            return
-        self._counts.skipped += subscription_id in self._waiting
-        # After the others that wait: one fast channel must not starve them.
-        self._waiting.pop(subscription_id, None)
-        self._waiting[subscription_id] = sample
-
-    def next(self) -> tuple[bytes, bytes] | None:
-        """What is to be written next, as a binary message in two parts; None: nothing waits."""
-        if not self._waiting:
-            return None
-        subscription_id = next(iter(self._waiting))
-        sample = self._waiting.pop(subscription_id)
-        self._counts.sent += 1
-        stamp_ns = max(0, sample.stamp_ns)
-        return struct.pack("<BIQ", _MESSAGE_DATA, subscription_id, stamp_ns), sample.data
-
-    def _subscribe(self, subscriptions: Iterable[tuple[int, int]]) -> Reaction:
-        begun: list[tuple[int, Channel]] = []
+    def _subscribe(self, subscriptions: Iterable[tuple[int, int]]) -> tuple[bytes, ...]:
         errors = []
         for key, channel_id in subscriptions:
             channel = self._advertised.get(channel_id)
@@ -238,15 +204,16 @@ class Session:
                 errors.append(f"{MAX_SUBSCRIPTIONS} subscriptions are open, the limit")
             else:
                 self._subscriptions[key] = channel
-                begun.append((key, channel))
-        return Reaction(_errors(errors), begun=tuple(begun))
+        return _errors(errors)
 
-    def _unsubscribe(self, ids: Sequence[int]) -> Reaction:
-        ended = [key for key in dict.fromkeys(ids) if key in self._subscriptions]
-        for key in ended:
-            self.end(key)
-        errors = [f"there is no subscription {key}" for key in ids if key not in ended]
-        return Reaction(_errors(errors), ended=tuple(ended))
+    def _unsubscribe(self, ids: Iterable[int]) -> tuple[bytes, ...]:
+        return _errors(
+            [
+                f"there is no subscription {key}"
+                for key in dict.fromkeys(ids)
+                if self._subscriptions.pop(key, None) is None
+            ]
+        )
 
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:
@@ -265,7 +232,6 @@ class Offer:
     def __init__(self, source: TwinSource) -> None:
         self.session_id = uuid.uuid4().hex
         self.channels: dict[int, Channel] = {}
-        self.counts = Counts()
         self._source = source
         self._ids = count(1)
         self._followers: dict[Callable[[], None], None] = {}

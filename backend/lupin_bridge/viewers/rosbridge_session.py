@@ -1,27 +1,16 @@
 """One rosbridge client: its subscriptions, their rates, and the ROS topics that it gets.
 
 A message of a ROS topic is serialized once for all its clients, by a worker: a map of millions of
-cells takes tenths of a second. Messages that wait for a client are bounded by the topic's depth and
-bytes: the newest map, the newest 50 observations. Of a throttled topic, only the newest one waits.
+cells takes tenths of a second.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
-from lupin_bridge.feed.relay import (
-    Bounded,
-    NotRelayedError,
-    Relay,
-    Sample,
-    TwinNames,
-    absolute,
-    topics_of,
-)
-from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.relay import Feed, Relay, Sample, TwinNames, absolute, topics_of
 from lupin_bridge.feed.tasks import Guard, Shared
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
@@ -41,19 +30,9 @@ from lupin_bridge.viewers.rosbridge_protocol import (
     service_response,
     status,
 )
-from lupin_twin.core.interfaces import Topic
 from lupin_twin.runtime.workers import Workers
 
 MAX_SUBSCRIPTIONS: Final = 32
-
-
-@dataclass(frozen=True, slots=True)
-class Feed:
-    """A subscription to a topic that the client spells `name`."""
-
-    topic: Topic
-    name: str
-    min_interval_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,79 +165,29 @@ class Writer:
     """Serializes samples as frames; all clients share one. Belongs to the event loop."""
 
     def __init__(self, relay: Relay, workers: Workers) -> None:
-        self.relay = relay
+        self._relay = relay
         self._workers = workers
         self._writing: Shared[bytes] = Shared()
+        # By topic.
+        self._guards: dict[str, Guard] = {}
 
     async def frame(self, feed: Feed, sample: Sample) -> bytes:
-        """The sample as a frame for a feed; concurrent requests for the same one share it.
-
-        Raises:
-            ValueError: not a message of the topic's type.
-
-        """
+        """The sample as a frame for a feed, or an error; concurrent requests for one share it."""
 
         def written(_: object) -> bytes:
-            message = json_of(self.relay.read(feed.topic, sample))
-            return text_frame(publish(feed.name, message))
+            message = json_of(self._relay.read(feed.topic, sample))
+            return text_frame(publish(str(feed.name), message))
 
         async def write() -> bytes:
             cost_s = len(sample.data) * _WRITE_S
             return await asyncio.wrap_future(self._workers.submit(written, cost_s))
 
-        return await self._writing.get((feed.name, id(sample)), write)
-
-
-class Feeds:
-    """One client's feeds: each is a task that waits for the client and never for another."""
-
-    def __init__(self, writer: Writer, send: Callable[[bytes], Awaitable[None]]) -> None:
-        self._writer = writer
-        self._send = send
-        self._tasks: dict[str, tuple[Feed, asyncio.Task[None]]] = {}
-
-    def follow(self, feeds: dict[str, Feed], renewed: str | None) -> None:
-        """Run exactly these feeds, by their spelling; restart the one that is `renewed`."""
-        for name, (feed, task) in list(self._tasks.items()):
-            if feeds.get(name) != feed or name == renewed:
-                task.cancel()
-                del self._tasks[name]
-        for name, feed in feeds.items():
-            if name not in self._tasks:
-                task = asyncio.create_task(self._feed(feed), name=f"rosbridge {name}")
-                self._tasks[name] = (feed, task)
-
-    def close(self) -> None:
-        """End all of them."""
-        self.follow({}, None)
-
-    async def _feed(self, feed: Feed) -> None:
-        waiting = Bounded(replace(feed.topic, depth=1) if feed.min_interval_s else feed.topic)
-        has_come = asyncio.Event()
-
-        def take(sample: Sample) -> None:
-            waiting.put(sample)
-            has_come.set()
-
-        try:
-            close = await self._writer.relay.listen(feed.topic, take)
-        except (NotRelayedError, TwinUnavailableError) as error:
-            await self._send(text_frame(status("error", str(error))))
-            return
-        guard = Guard(f"rosbridge, {feed.topic.name}", ValueError)
-        try:
-            while True:
-                await has_come.wait()
-                has_come.clear()
-                while waiting:
-                    frame = await guard.run(self._writer.frame(feed, waiting.take()))
-                    if isinstance(frame, Exception):
-                        is_known = isinstance(frame, ValueError)
-                        why = str(frame) if is_known else "an internal error, see the bridge's log"
-                        text = f"a message of topic {shown(feed.name)} is left out: {why}"
-                        frame = text_frame(status("error", text))
-                    await self._send(frame)
-                    if feed.min_interval_s:
-                        await asyncio.sleep(feed.min_interval_s)
-        finally:
-            close()
+        topic = feed.topic.name
+        guard = self._guards.setdefault(topic, Guard(f"rosbridge, {topic}", ValueError))
+        frame = await guard.run(self._writing.get((feed.name, id(sample)), write))
+        if not isinstance(frame, Exception):
+            return frame
+        is_known = isinstance(frame, ValueError)
+        why = str(frame) if is_known else "an internal error, see the bridge's log"
+        text = f"a message of topic {shown(feed.name)} is left out: {why}"
+        return text_frame(status("error", text))

@@ -152,12 +152,13 @@ def test_a_picture_is_transparent_where_nothing_is_known(
 
 
 def test_an_estimate_is_known_where_it_is_certain_to_a_part_of_the_narrowest_ideal_range() -> None:
-    wide, narrow = (Ranges(ideal=Span(20.0, high)) for high in (60.0, 26.0))
-    sensor = replace(SENSORS.named("ph"), day=wide, night=narrow)
+    sensor = replace(
+        SENSORS.named("ph"), ideal=Span(20.0, 60.0), night=Ranges(ideal=Span(20.0, 26.0))
+    )
     found = formats.within_ideal(ESTIMATE, sensor).grid
     assert found.sd_known == 1.0
     assert found.known.ravel().tolist() == [True, True, False, False, False, False]
-    for other in (replace(sensor, night=wide), SENSORS.named("ph")):
+    for other in (replace(sensor, night=None), SENSORS.named("ph")):
         assert formats.within_ideal(ESTIMATE, other) is ESTIMATE
 
 

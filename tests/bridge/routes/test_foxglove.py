@@ -5,6 +5,7 @@ import base64
 import json
 import shutil
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -156,6 +157,11 @@ def refuse(_: object) -> NoReturn:
     raise ValueError("no subscription to it")
 
 
+def has_tags(here: Any, count: int) -> bool:
+    latest = here.bridge.latest
+    return latest is not None and len(latest.snapshot.tags) >= count
+
+
 async def topics_are_subscribed_while_wanted(here: Any) -> None:
     """Without clients, and then topics end at once."""
     hub, offer, relay = here.bridge.hub, here.bridge.offer, here.bridge.source.relay
@@ -177,7 +183,7 @@ async def topics_are_subscribed_while_wanted(here: Any) -> None:
     await until(lambda: len(hub) == 0, "nobody again")
 
 
-async def test_a_slow_client_gets_the_latest_messages_and_one_that_never_reads_is_closed(
+async def test_a_slow_client_gets_the_last_50_observations_and_one_that_never_reads_is_closed(
     domain: int,
 ) -> None:
     async with inprocess.running() as here:
@@ -189,19 +195,22 @@ async def test_a_slow_client_gets_the_latest_messages_and_one_that_never_reads_i
         with Peer(domain) as peer:
             peer.publish_map(messages.occupancy_grid([[0] * 3000] * 3000))
             await until(lambda: hub.blocked == 2, "two full sockets")
-            before = offer.counts.skipped
-            for number in range(20):
+            relay = here.bridge.source.relay
+            before = relay.skipped
+            for number in range(70):
                 peer.observe(messages.scan(f"seen {number}.", {"co2": 1.0}))
-            await until(lambda: offer.counts.skipped >= before + 38, "what gave way")
+                await until(partial(has_tags, here, number + 1), "its arrival")
+            await until(lambda: relay.skipped >= before + 2 * 19, "what gave way")
             most_bytes = max(
                 connection.transport.get_write_buffer_size()
                 for connection in here.server.server_state.connections
             )
             assert 0 < most_bytes <= PIECE_BYTES, "of the map a piece, and nothing behind it"
             got = bytearray()
-            while b"seen 19." not in got[-100_000:]:
+            while b"seen 69." not in got[-100_000:]:
                 got += await slow[0].read(1 << 20)
-            assert b"seen 18." not in got, "and none of those before"
+            assert b"seen 20." in got
+            assert b"seen 15." not in got, "and none of those before"
             await until(lambda: hub.blocked == 1, "the one that reads")
             hub.client_timeout_s = 0.1
             await until(lambda: hub.clients_dismissed == 1, "the other's end")

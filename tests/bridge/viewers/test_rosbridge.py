@@ -12,13 +12,12 @@ import numpy as np
 import orjson
 import pytest
 
-from lupin_bridge.feed.relay import NotRelayedError, Sample, TwinNames
+from lupin_bridge.feed.relay import Feed, NotRelayedError, Sample, TwinNames
+from lupin_bridge.routes.sockets import Feeds
 from lupin_bridge.stream.frames import FrameWriter, StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import json_of
 from lupin_bridge.viewers.rosbridge_session import (
     MAX_SUBSCRIPTIONS,
-    Feed,
-    Feeds,
     Reaction,
     Session,
     Writer,
@@ -229,7 +228,7 @@ class Relay:
 
     def __init__(self) -> None:
         self.ears: list[Callable[[Sample], None]] = []
-        self.read_count = 0
+        self.read_count = self.skipped = 0
         self.refuses = False
 
     async def listen(self, topic: Topic, take: Callable[[Sample], None]) -> Any:
@@ -265,15 +264,20 @@ class SimpleMessage:
 class Client:
     """What a client has received; it reads only while its gate is open."""
 
-    def __init__(self, writer: Writer) -> None:
+    def __init__(self, relay: Any, writer: Writer) -> None:
         self.frames: list[bytes] = []
+        self.refused: list[str] = []
         self.gate = asyncio.Event()
         self.gate.set()
-        self.feeding = Feeds(writer, self._send)
+        self.feeding = Feeds(relay, self._send, self._refuse)
+        self._writer = writer
 
-    async def _send(self, frame: bytes) -> None:
-        self.frames.append(frame)
+    async def _send(self, feed: Feed, sample: Sample) -> None:
+        self.frames.append(await self._writer.frame(feed, sample))
         await self.gate.wait()
+
+    async def _refuse(self, _feed: Feed, why: str) -> None:
+        self.refused.append(why)
 
 
 def json_frame(text: str) -> bytes:
@@ -299,25 +303,25 @@ def writer(relay: Relay) -> Iterator[Writer]:
 async def test_a_message_is_serialised_once_for_all_clients_with_equal_options(
     relay: Relay, writer: Writer
 ) -> None:
-    clients = [Client(writer) for _ in range(3)]
+    clients = [Client(relay, writer) for _ in range(3)]
     for client in clients:
-        client.feeding.follow({"in": feed()}, "in")
+        client.feeding.follow([feed()])
     await until(lambda: len(relay.ears) == 3, "the clients to listen")
     relay.publish("a")
     await until(lambda: all(client.frames for client in clients), "the message")
     assert [client.frames for client in clients] == [[json_frame("a")]] * 3
     assert relay.read_count == 1
     for client in clients:
-        client.feeding.close()
+        client.feeding.follow(())
     await until(lambda: not relay.ears, "nobody to listen")
 
 
 async def test_what_waits_for_a_slow_client_is_limited_by_the_topics_depth(
     relay: Relay, writer: Writer
 ) -> None:
-    slow = Client(writer)
+    slow = Client(relay, writer)
     slow.gate.clear()
-    slow.feeding.follow({"in": feed()}, "in")
+    slow.feeding.follow([feed()])
     await until(lambda: bool(relay.ears), "it to listen")
     relay.publish("0")
     await until(lambda: bool(slow.frames), "the first")
@@ -325,15 +329,16 @@ async def test_what_waits_for_a_slow_client_is_limited_by_the_topics_depth(
     slow.gate.set()
     await until(lambda: len(slow.frames) == 4, "the rest")
     assert slow.frames == [json_frame(text) for text in "0234"]
+    assert relay.skipped == 1
 
 
 async def test_a_throttled_client_gets_the_latest_message_and_not_before_its_time(
     relay: Relay, writer: Writer
 ) -> None:
-    quick, often, rare = (Client(writer) for _ in range(3))
-    quick.feeding.follow({"in": feed()}, "in")
-    often.feeding.follow({"in": feed(min_interval_s=0.001)}, "in")
-    rare.feeding.follow({"in": feed(min_interval_s=3600.0)}, "in")
+    quick, often, rare = (Client(relay, writer) for _ in range(3))
+    quick.feeding.follow([feed()])
+    often.feeding.follow([feed(min_interval_s=0.001)])
+    rare.feeding.follow([feed(min_interval_s=3600.0)])
     await until(lambda: len(relay.ears) == 3, "them to listen")
     often.gate.clear()
     relay.publish("0")
@@ -349,8 +354,8 @@ async def test_a_throttled_client_gets_the_latest_message_and_not_before_its_tim
 async def test_an_unserialisable_message_is_an_error_for_the_client(
     relay: Relay, writer: Writer, caplog: pytest.LogCaptureFixture
 ) -> None:
-    client = Client(writer)
-    client.feeding.follow({"in": feed()}, "in")
+    client = Client(relay, writer)
+    client.feeding.follow([feed()])
     await until(lambda: bool(relay.ears), "it to listen")
     relay.publish("odd", "odd", "bad")
     await until(lambda: len(client.frames) == 3, "all of them")
@@ -362,6 +367,10 @@ async def test_an_unserialisable_message_is_an_error_for_the_client(
     assert good == json_frame("good")
     assert caplog.text.count("Traceback") == 1, "what persists is logged once"
     relay.refuses = True
-    client.feeding.follow({"in": feed()}, "in")
-    await until(lambda: len(client.frames) == 5, "the refusal")
-    assert b"no such type" in client.frames[-1]
+    client.feeding.follow([feed()], "in")
+    await until(lambda: client.refused == ["no such type"], "the refusal")
+    relay.refuses = False
+    client.feeding.follow([feed()])
+    await until(lambda: bool(relay.ears), "it to listen again")
+    client.feeding.follow(())
+    await until(lambda: not relay.ears, "its end")

@@ -27,7 +27,6 @@ from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_twin.core import ingest
-from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
 from lupin_twin.core.drops import Counts, Drop, DropCounts, Reason, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
@@ -103,7 +102,7 @@ def read_message(
     except TooManyError as error:
         return Drop(Reason.SIZE, str(error))
     except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
-        return Drop(Reason.UNREADABLE, str(error), "an unreadable message")
+        return Drop(Reason.UNREADABLE, str(error), "dropped an unreadable message")
 
 
 class NodeUtilities:
@@ -163,7 +162,8 @@ class NodeUtilities:
             if depth > 1 and number is not None and is_wanted is None:
                 lost = source.gaps.see(number, lambda: int(self.node.count_publishers(name)))
                 if lost:
-                    self.lose(lost, name)
+                    what = f"lost {lost} messages"
+                    self.drop(Drop(Reason.LOST, "they arrived too fast", what, count=lost), name)
             message = read_message(data, shape)
             if isinstance(message, Drop):
                 self.drop(message, name)
@@ -290,7 +290,7 @@ class NodeUtilities:
         try:
             new = convert.map_of(msg, 0)
         except ValueError as error:
-            self.drop(Drop(Reason.MAP, f"{error}; the previous one stays", "a map"), topic)
+            self.drop(Drop(Reason.MAP, f"{error}; the previous one stays", "dropped a map"), topic)
             return None
         return None if before is not None and new.shows_the_same_as(before) else new
 
@@ -304,8 +304,8 @@ class NodeUtilities:
             )
 
     def drop(self, drop: Drop, topic: str) -> None:
-        """Count and report something that was dropped."""
-        self._drops.add(drop.reason.value, drop.on(topic), time.monotonic())
+        """Count and report something that was dropped, lost or late."""
+        self._drops.add(drop.reason.value, drop.on(topic), time.monotonic(), drop.count)
         self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
 
     @property
@@ -316,18 +316,6 @@ class NodeUtilities:
     def counts(self) -> Counts:
         """Return all drops, losses and errors so far."""
         return self._drops.value(time.monotonic())
-
-    def lose(self, count: int, topic: str) -> None:
-        """Count and report messages that came faster than they were read."""
-        text = f"messages on {topic} arrived too fast"
-        self._drops.add(Reason.LOST.value, text, time.monotonic(), count)
-        self.warn((Reason.LOST, topic), f"lost {count} messages on {topic}: they arrived too fast")
-
-    def late(self, late: Late, topic: str) -> None:
-        """Count and report a producer whose stamps stay behind its own earlier ones."""
-        text = f"late stamps on {topic}: {late}"
-        self._drops.add(Reason.LATE_STAMP.value, text, time.monotonic(), late.news)
-        self.warn((Reason.LATE_STAMP, late.counted_as), text)
 
     def warn(self, key: tuple[str, object], text: str) -> None:
         """Log a warning, at most one a period for each key, and how many were held back."""

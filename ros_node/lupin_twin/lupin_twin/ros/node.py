@@ -213,7 +213,7 @@ class TwinNode(AdjustableNode):
             now_s=time.monotonic(),
         )
         if late is not None:
-            self.utilities.late(late, topic)
+            self.utilities.drop(late, topic)
 
     def _on_discovered_tags(self, msg: Any) -> None:
         topic = self._topics["discovered_tags_topic"]

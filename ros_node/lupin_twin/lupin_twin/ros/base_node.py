@@ -33,7 +33,7 @@ from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import convert
-from lupin_twin.ros.inputs import Input, TwinCount
+from lupin_twin.ros.inputs import Input
 from lupin_twin.ros.message_limits import MessageShape, TooManyError
 from lupin_twin.ros.parameters import naming
 from lupin_twin.runtime import process
@@ -47,6 +47,9 @@ WORK_DRAIN_S: Final = 1.0
 # of the fifty that may wait do so by then. The thread then counts as behind for `BELIEVED_S`.
 BEHIND_S: Final = 0.05
 BELIEVED_S: Final = 0.25
+# A twin that has died stays in DDS's graph for 20 s (the lease). A twin restarted in its place must
+# not count as a second one.
+LEFT_OVER_S: Final = 30.0
 # The default of ROS, reliable and volatile, except for the depth.
 SERVICE_QOS: Final = QoSProfile(depth=SERVICE_DEPTH)
 # Without rclpy's default warnings about subscribers that do not match, which log the same warning
@@ -118,6 +121,9 @@ class NodeUtilities:
         self._inputs: list[Input] = []
         # As of the last `check_inputs`.
         self.input_problems: tuple[str, ...] = ()
+        # The twins that publish one state, see `check_twins`.
+        self.twins = 1
+        self._several_since_s = math.inf
         self._drains: list[Callable[[], None]] = []
         self._behind_until_s = -math.inf
         self._throttle = Throttle(WARNING_PERIOD_S)
@@ -294,12 +300,15 @@ class NodeUtilities:
             return None
         return None if before is not None and new.shows_the_same_as(before) else new
 
-    def check_twins(self, twins: TwinCount, topic: str, what: str) -> None:
+    def check_twins(self, topic: str, what: str) -> None:
         """Count the publishers of a twin's state; warns if several; `what` is the consequence."""
-        if twins.see(int(self.node.count_publishers(topic)), time.monotonic()):
+        publishers, now_s = int(self.node.count_publishers(topic)), time.monotonic()
+        self._several_since_s = min(self._several_since_s, now_s) if publishers > 1 else math.inf
+        self.twins = publishers if now_s - self._several_since_s >= LEFT_OVER_S else 1
+        if self.twins > 1:
             self.warn(
                 ("twins", 0),
-                f"{twins.value} nodes publish {topic}: {what}; "
+                f"{self.twins} nodes publish {topic}: {what}; "
                 "stop all twins but one, or give them ROS domains of their own",
             )
 

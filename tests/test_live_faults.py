@@ -117,7 +117,7 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
 def test_a_second_twin_is_reported_by_the_real_name_of_its_topic_and_its_end_too(
     domain: int,
 ) -> None:
-    soon = constants(**{"lupin_twin.ros.inputs:LEFT_OVER_S": 2.0})
+    soon = constants(**{"lupin_twin.ros.base_node:LEFT_OVER_S": 2.0})
     names = (("twin/state", "r1/state"), ("floranova/observations", "r1/observations"))
     remapped = ("--ros-args", *(word for it in names for word in ("-r", "/{}:=/{}".format(*it))))
     with (

@@ -96,7 +96,7 @@ def test_every_loss_of_a_new_publisher_is_counted(domain: int) -> None:
         twin.thaw()
 
         def is_all(values: dict[str, dict[str, str]]) -> bool:
-            lost = int(values["queues"]["lost"])
+            lost = int(values["drops"].get("lost", 0))
             return lost > 0 and lost + int(values["journal"]["written"]) == count
 
         assert diagnosed(peer, is_all)

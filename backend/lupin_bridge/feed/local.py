@@ -49,7 +49,7 @@ class LocalTwin(RosSource[TwinNode]):
                     TwinUpdate(
                         snapshot,
                         "-".join((self.identity, *map(str, node.revision))),
-                        node.twins.value,
+                        node.utilities.twins,
                         node.occupancy_map,
                         node.utilities.counts(),
                         journal=node.memory.condition,

@@ -287,7 +287,7 @@ class WebTwin(RosSource[WebNode]):
                 update = TwinUpdate(
                     snapshot,
                     node.revision,
-                    node.twins.value,
+                    node.utilities.twins,
                     node.occupancy_map,
                     report.counts,
                     node.utilities.counts(),

@@ -23,7 +23,6 @@ from lupin_twin.field.explored import OccupancyMap, digest_of
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.convert import findings_of
-from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.parameters import (
     AdjustableNode,
     declare,
@@ -82,7 +81,6 @@ class WebNode(AdjustableNode):
         self.utilities = NodeUtilities(self)
         self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = FieldRules.of(self.parameters)
-        self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
         self.publishers_digest = ""
@@ -205,7 +203,7 @@ class WebNode(AdjustableNode):
         # The same in all replicas: DDS gives a publisher one id for all who see it.
         ids = sorted(bytes(it.endpoint_gid) for it in self.get_publishers_info_by_topic(topic))
         self.publishers_digest = blake2b(b"".join(ids), digest_size=6).hexdigest()
-        self.utilities.check_twins(self.twins, topic, "what is shown is a mixture")
+        self.utilities.check_twins(topic, "what is shown is a mixture")
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)
         clock = reported_clock(

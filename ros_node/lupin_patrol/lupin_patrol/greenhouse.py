@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from heapq import heappop, heappush
 from itertools import accumulate, pairwise
 from math import atan2, dist
 from pathlib import Path
@@ -213,53 +214,39 @@ class Roadmap:
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._obstacles = [table.grown(CLEARANCE_M) for table in greenhouse.tables]
-        self._corners = np.array(
-            [
-                corner
-                for obstacle in self._obstacles
-                for corner in obstacle.corners
-                if greenhouse.is_free(corner)
-            ]
-        ).reshape(-1, 2)
-        self._length, self._next = self._shortest_between_corners()
+        corners = (corner for obstacle in self._obstacles for corner in obstacle.corners)
+        self._corners = np.array(list(filter(greenhouse.is_free, corners))).reshape(-1, 2)
+        self._seen = {corner: self._seen_from(corner) for corner in _points(self._corners)}
 
     def way(self, start: Point, goal: Point) -> list[Point]:
-        """Return the shortest path as a polyline from start to goal, both included.
+        """Return the shortest path (Dijkstra, 1959) as a polyline, from start to goal inclusive.
 
         Raises ValueError when there is no path.
         """
         if not crossings(start, np.array([goal]), self._obstacles).any():
             return [start, goal]
-        total = (
-            self._straight(start)[:, np.newaxis] + self._length + self._straight(goal)[np.newaxis]
-        )
-        if not np.isfinite(total).any():
-            raise ValueError(f"no way from {start} to {goal} is {2 * CLEARANCE_M} m wide")
-        first, last = np.unravel_index(np.argmin(total), total.shape)
-        corner, bends = int(first), []
-        while corner != last:
-            bends.append(corner)
-            corner = int(self._next[corner, last])
-        bends.append(corner)
-        return [start, *((float(x), float(y)) for x, y in self._corners[bends]), goal]
+        seen, before_goal = {**self._seen, start: self._seen_from(start)}, self._seen_from(goal)
+        ahead, reached = [(0.0, [start])], set()
+        while ahead:
+            length_m, way = heappop(ahead)
+            here = way[-1]
+            if here == goal:
+                return way
+            if here in reached:
+                continue
+            reached.add(here)
+            for there in (*seen[here], *([goal] if here in before_goal else ())):
+                heappush(ahead, (length_m + dist(here, there), [*way, there]))
+        raise ValueError(f"no way from {start} to {goal} is {2 * CLEARANCE_M} m wide")
 
-    def _straight(self, point: Point) -> NDArray[np.float64]:
-        """Straight-line distance from a point to each corner; infinite if the corner is hidden."""
-        away: NDArray[np.float64] = np.hypot(*(self._corners - np.asarray(point)).T)
-        away[crossings(point, self._corners, self._obstacles).any(axis=1)] = np.inf
-        return away
+    def _seen_from(self, point: Point) -> list[Point]:
+        """The corners to which the way from a point is straight."""
+        hidden = crossings(point, self._corners, self._obstacles).any(axis=1)
+        return _points(self._corners[~hidden])
 
-    def _shortest_between_corners(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Floyd-Warshall: path lengths between all corners, and the next corner on each path."""
-        count = len(self._corners)
-        length = np.array([self._straight((x, y)) for x, y in self._corners]).reshape(count, count)
-        following = np.tile(np.arange(count), (count, 1))
-        for via in range(count):
-            detour = length[:, [via]] + length[[via], :]
-            shorter = detour < length
-            length = np.where(shorter, detour, length)
-            following = np.where(shorter, following[:, [via]], following)
-        return length, following
+
+def _points(rows: NDArray[np.float64]) -> list[Point]:
+    return [(x, y) for x, y in rows.tolist()]
 
 
 def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:

@@ -44,7 +44,7 @@ def found(name: str, **changes: Any) -> Finding:
 
 def test_a_healthy_twin_is_ok_in_every_check() -> None:
     levels = {finding.name: finding.level for finding in findings(WELL)}
-    names = "clock origin inputs drops queues stamps fields journal twins"
+    names = "clock origin inputs drops stamps fields journal twins"
     assert levels == dict.fromkeys(names.split(), OK)
 
 
@@ -60,13 +60,6 @@ def test_a_healthy_twin_is_ok_in_every_check() -> None:
         ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 recently"),
         ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing recently"),
         ("drops", {"counts": Counts(callback_errors=1)}, WARN, "nothing recently"),
-        (
-            "queues",
-            {"counts": Counts({"lost": 5}, 0, (Recent("lost", "", 5),))},
-            WARN,
-            "5 messages",
-        ),
-        ("queues", {"counts": Counts({"lost": 5})}, OK, "nothing lost"),
         ("stamps", {"late": {"robot": 9}}, WARN, "behind their own earlier ones from robot"),
         ("journal", {"journal": Condition(JournalState.FAILING, "no room")}, ERROR, "no room"),
         ("twins", {"twins": 2}, ERROR, "2 twins"),
@@ -84,12 +77,12 @@ def test_the_numbers_are_there() -> None:
     counts = Counts({"frame": 40, "lost": 5}, 0, (FRAME,))
     values = {
         "frame": "40",
+        "lost": "5",
         "recently: frame": "12",
         "last: frame": "its frame is 'odom'",
         "callback errors": "0",
     }
     assert found("drops", counts=counts).values == values
-    assert found("queues", counts=counts).values == {"lost": "5"}
     assert found("fields").values == {"computed": "3", "slowest, s": "0.250"}
     assert found("inputs").values["last observation, s ago"] == "2.0"
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from lupin_twin.core.clock import APART_S, FEW, MAX_SOURCES, OTHERS, Late, Lateness
+from lupin_twin.core.clock import APART_S, FEW, MAX_SOURCES, OTHERS, Lateness
+from lupin_twin.core.drops import Drop
 
 S = 1_000_000_000
 
@@ -16,7 +17,7 @@ class Robot:
 
     def findings(
         self, *stamps_s: float, was_latched: bool = False, every_s: float = 1.0
-    ) -> list[Late]:
+    ) -> list[Drop]:
         """The findings for messages with these stamps."""
         found = []
         for stamp_s in stamps_s:
@@ -41,10 +42,13 @@ def test_a_clock_that_stepped_back_is_reported_after_a_few_messages(robot: Robot
     robot.findings(1000.0, 1001.0)
     assert robot.findings(*(400.0 + i for i in range(FEW))) == []
     assert robot.lateness.counts == {}
-    assert robot.findings(410.0) == [Late("robot", FEW + 1, 591.0, "robot", FEW + 1)]
+    [late] = robot.findings(410.0)
+    assert (late.case, late.count) == ("robot", FEW + 1)
+    assert f"{FEW + 1} observations in a row from source 'robot'" in late.why
+    assert "the last by 591 s" in late.why
     assert robot.lateness.counts == {"robot": FEW + 1}
     more = robot.findings(411.0, 412.0)
-    assert [(late.run, late.news) for late in more] == [(FEW + 2, 1), (FEW + 3, 1)]
+    assert [late.count for late in more] == [1, 1]
     assert robot.lateness.counts == {"robot": FEW + 3}
     assert robot.findings(1002.0) == [], "it has caught up"
     assert robot.findings(*(400.0 + i for i in range(FEW))) == []

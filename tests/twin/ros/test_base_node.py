@@ -17,6 +17,7 @@ from lupin_twin.ros import base_node
 from lupin_twin.ros.base_node import (
     BEHIND_S,
     BELIEVED_S,
+    LEFT_OVER_S,
     WARNING_PERIOD_S,
     NodeUtilities,
     end_spinning,
@@ -108,6 +109,24 @@ def test_warnings_are_limited_per_key_and_counted(utilities: NodeUtilities, logg
         utilities.drop(Drop(Reason.FRAME, "no"), "/t")
     assert len(logged.lines) == 4 + 3 + 58  # after 10, 20 and 40 s, then once a minute
     assert logged.lines[-1] == f"{wording} (59 more since the last warning)"
+
+
+def test_two_twins_are_two_once_a_dead_one_would_have_left_the_graph(
+    utilities: NodeUtilities, logged: Logged
+) -> None:
+    for publishers, after_s, twins in (
+        (2, 0.0, 1),
+        (2, LEFT_OVER_S - 0.1, 1),
+        (2, LEFT_OVER_S, 2),
+        (3, LEFT_OVER_S + 1.0, 3),
+        (1, LEFT_OVER_S + 2.0, 1),
+        (2, LEFT_OVER_S + 3.0, 1),
+    ):
+        utilities.node.count_publishers = lambda _, found=publishers: found
+        logged.now_s = 100.0 + after_s
+        utilities.check_twins("/twin/state", "a mixture")
+        assert utilities.twins == twins
+    assert logged.lines[0].startswith("2 nodes publish /twin/state: a mixture; stop all")
 
 
 def test_on_a_shared_topic_only_wanted_messages_are_read_and_the_others_not_counted(

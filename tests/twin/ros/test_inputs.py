@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.ros.inputs import LEFT_OVER_S, Gaps, Input, TwinCount, other_users
+from lupin_twin.ros.inputs import Gaps, Input, other_users
 
 
 def test_other_users_are_those_who_own_ports_of_the_domain(tmp_path: Path) -> None:
@@ -66,16 +66,3 @@ def test_with_one_writer_every_lost_message_is_counted(skips: list[int], start: 
     for skip in skips:
         number += 1 + skip
         assert gaps.see(number, lambda: 1) == skip
-
-
-def test_two_writers_are_two_once_a_dead_one_would_have_left_the_graph() -> None:
-    count = TwinCount()
-    assert not count.see(2, 100.0)
-    assert not count.see(2, 100.0 + LEFT_OVER_S - 0.1)
-    assert count.value == 1
-    assert count.see(2, 100.0 + LEFT_OVER_S)
-    assert count.see(3, 101.0 + LEFT_OVER_S)
-    assert count.value == 3
-    assert not count.see(1, 102.0 + LEFT_OVER_S)
-    assert not count.see(2, 103.0 + LEFT_OVER_S)
-    assert count.value == 1

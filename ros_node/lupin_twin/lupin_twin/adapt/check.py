@@ -1,15 +1,20 @@
-"""`adapt --check`: reports what a configuration would accept and drop, or suggests one."""
+"""Runs `adapt`; `adapt --check` reports what it accepts and drops, or suggests a configuration."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Final
 
 import yaml
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from lupin_twin.adapt.config import POSES, STANDARD
+from lupin_twin.adapt.config import POSES, STANDARD, Config, read_config
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
     TF_STATIC,
@@ -23,11 +28,58 @@ from lupin_twin.adapt.messages import (
 from lupin_twin.adapt.node import ANY_PUBLISHER, TF_STATIC_QOS, AdaptNode
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK
+from lupin_twin.core.parameters import ParameterError
+from lupin_twin.ros.base_node import run_until_signal, running_ros
+from lupin_twin.runtime import process
+from lupin_twin.runtime.process import refuse
 
 POLL_S: Final = 0.2
 _KNOWN: Final = frozenset({*STANDARD, *POSES, TF_TYPE, DETECTIONS_TYPE})
 # Frames of the robot's base: REP 105's name, and a common alternative.
 _BASES: Final = ("base_link", "base_footprint")
+
+
+def start(path: Path | None, ros_args: Sequence[str], check_s: float | None) -> int:
+    """Run the adapter until a signal ends it or, with `check_s`, the check, which takes so long.
+
+    Returns the exit code: 2 for an invalid configuration, 1 if the check found a fault.
+    """
+    try:
+        config = None if path is None else read_config(path)
+        with running_ros(["adapt", *ros_args]):
+            if config is None or check_s is not None:
+                return _check(config, check_s or 0.0)
+            node = AdaptNode(config)
+            node.get_logger().info(
+                f"adapting sensors for {len(config.tags)} tags; "
+                "/diagnostics shows what arrives and what is dropped"
+            )
+            return run_until_signal(node)
+    except (ConfigError, ParameterError) as error:
+        return refuse("adapt", str(error))
+
+
+def _check(config: Config | None, seconds: float) -> int:
+    """Listen for `seconds`, and write the report or, without a configuration, a suggestion."""
+    node = Listener() if config is None else AdaptNode(config, is_check=True)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, process.STOP_SIGNALS)
+    sys.stderr.write(f"listening for {seconds:g} s ...\n")
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    until_s = time.monotonic() + seconds
+    while (left_s := until_s - time.monotonic()) > 0:
+        executor.spin_once(timeout_sec=left_s)
+    if isinstance(node, AdaptNode):
+        lines = list(report(node, seconds))
+        node.destroy_node()
+        sys.stdout.writelines(f"{line}\n" for _, line in lines)
+        return 0 if all(is_right for is_right, _ in lines) else 1
+    sys.stderr.writelines(f"{why}\n" for why in node.missing.values())
+    if not any(source.received for source in node.sources.values()):
+        topics = ", ".join(sorted(name for name, _ in node.get_topic_names_and_types()))
+        return refuse("adapt", f"no reading and no pose was received; topics: {topics or 'none'}")
+    sys.stdout.write(f"# Fill in where each tag is: [x, y] in m.\n{suggestion(node)}")
+    return 0
 
 
 def report(node: AdaptNode, seconds: float) -> Iterator[tuple[bool, str]]:

@@ -20,8 +20,8 @@ from lupin_twin.adapt.table import (
     Value,
     check_text,
     is_number,
-    shown,
     value_of,
+    wrong,
 )
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 from lupin_twin.core.parameters import FARTHEST_M
@@ -181,9 +181,7 @@ def _detections(table: Table) -> Detections:
     detections = Detections(table.text("topic"), table.text("name", TAG_FRAME))
     table.end()
     if "{id}" not in detections.name:
-        raise ConfigError(
-            f"detections.name is {shown(detections.name)}, expected {{id}} in it, and {{family}}"
-        )
+        raise wrong("detections.name", detections.name, "{id} in it, and {family}")
     return detections
 
 
@@ -219,10 +217,8 @@ def place_of(what: str, at: Any, otherwise: str = "") -> Pose:
         or len(at) not in (2, 3)
         or not all(is_number(each) and abs(each) <= FARTHEST_M for each in at)
     ):
-        raise ConfigError(
-            f"{what} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {FARTHEST_M:.0f}"
-            f"{otherwise}"
-        )
+        limits = f"[x, y] or [x, y, z] in m up to {FARTHEST_M:.0f}"
+        raise wrong(what, at, f"{limits}{otherwise}")
     return Pose.at(*at)
 
 
@@ -241,15 +237,11 @@ def _sensors(table: Table) -> Iterator[Sensor]:
 def _sensor(name: str, table: Table) -> Sensor:
     type_name = table.text("type")
     if not _TYPE.fullmatch(type_name):
-        raise ConfigError(
-            f"{table.name}.type is {shown(type_name)}, expected such as sensor_msgs/msg/Temperature"
-        )
+        raise wrong(f"{table.name}.type", type_name, "such as sensor_msgs/msg/Temperature")
     _, known = STANDARD.get(type_name, ("", AS_IT_IS))
     field = table.text("field", known.path or None)
     if not _FIELD.fullmatch(field):
-        raise ConfigError(
-            f"{table.name}.field is {shown(field)}, expected a path such as data or axes[2].value"
-        )
+        raise wrong(f"{table.name}.field", field, "a path such as data or axes[2].value")
     # The factor belongs to the standard field; another field of the message has its own unit.
     factor = known.factor if field == known.path else 1.0
     sensor = Sensor(

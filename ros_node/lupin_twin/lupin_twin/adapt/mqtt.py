@@ -27,6 +27,7 @@ from lupin_twin.adapt.table import (
     shown,
     value_of,
     values_of,
+    wrong,
 )
 from lupin_twin.core.drops import Rejected, check_texts
 
@@ -169,12 +170,12 @@ def broker_of(table: Table, folder: Path) -> Broker:
     except ValueError:
         url, port = urlsplit(""), 0
     if url.scheme not in PORTS or not url.hostname or port == 0 or url.path.strip("/"):
-        raise ConfigError(f"mqtt.url is {shown(text)}, expected such as mqtt://broker.lan:1883")
+        raise wrong("mqtt.url", text, "such as mqtt://broker.lan:1883")
     if "@" in url.netloc:
         raise ConfigError("mqtt.url has a user in it: use mqtt.user and mqtt.password_file")
     listed = table.take("topics")
     if not isinstance(listed, list) or not 0 < len(listed) <= MAX_TOPICS:
-        raise ConfigError(f"mqtt.topics is {shown(listed)}, expected a list of 1 to {MAX_TOPICS}")
+        raise wrong("mqtt.topics", listed, f"a list of 1 to {MAX_TOPICS}")
     patterns: list[Pattern] = []
     for number, each in enumerate(listed):
         patterns.extend(_patterns(Table(f"mqtt.topics[{number}]", each)))
@@ -206,9 +207,7 @@ def _password(table: Table, folder: Path) -> str:
 def _patterns(table: Table) -> Iterator[Pattern]:
     topic = table.text("topic")
     if "#" in topic or topic.startswith("/") or "$" in topic:
-        raise ConfigError(
-            f"{table.name}.topic is {shown(topic)}, expected levels with {{tag}}, {{sensor}} or +"
-        )
+        raise wrong(f"{table.name}.topic", topic, "levels with {tag}, {sensor} or +")
     preset = table.one_of("preset", PRESETS) if table.has("preset") else ""
     tag = str(table.take("tag", ""))
     there = table.text("availability", "")

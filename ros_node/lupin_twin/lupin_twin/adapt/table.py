@@ -26,7 +26,7 @@ class Table:
 
     def __init__(self, name: str, content: Any) -> None:
         if not isinstance(content, dict):
-            raise ConfigError(f"{name or 'the file'} is {shown(content)}, expected keys and values")
+            raise wrong(name or "the file", content, "keys and values")
         self.name = name
         self.content: dict[Any, Any] = dict(content)
         self._known: list[str] = []
@@ -53,9 +53,7 @@ class Table:
         """Take a value that is one of `names`."""
         value = self.take(key)
         if value not in names:
-            raise ConfigError(
-                f"{self._called(key)} is {shown(value)}, expected one of {', '.join(names)}"
-            )
+            raise wrong(self._called(key), value, f"one of {', '.join(names)}")
         return str(value)
 
     def number(
@@ -64,11 +62,9 @@ class Table:
         """Take a number from `low` to `high`."""
         value = self.take(key, default)
         if value is not default and not is_number(value):
-            raise ConfigError(f"{self._called(key)} is {shown(value)}, expected a number")
+            raise wrong(self._called(key), value, "a number")
         if not low <= value <= high:
-            raise ConfigError(
-                f"{self._called(key)} is {shown(value)}, must be from {low:g} to {high:g}"
-            )
+            raise wrong(self._called(key), value, f"{low:g} to {high:g}")
         return float(value)
 
     def end(self) -> None:
@@ -79,6 +75,11 @@ class Table:
 
     def _called(self, key: object) -> str:
         return f"{self.name}.{key}" if self.name else str(key)
+
+
+def wrong(what: str, value: Any, expected: str) -> ConfigError:
+    """Return the error about a key, its value, and what was expected."""
+    return ConfigError(f"{what} is {shown(value)}, expected {expected}")
 
 
 def check_text(what: str, value: Any) -> str:

@@ -22,6 +22,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Final
 
+from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.state import ClockState
 
 # A clock that has not moved for this long, s of steady time, is not running.
@@ -92,29 +93,6 @@ MAX_SOURCES: Final = 64
 OTHERS: Final = "(others)"
 
 
-@dataclass(frozen=True, slots=True)
-class Late:
-    """A run of late observations: its length, and by how many s the last one is behind.
-
-    `counted_as` is the name it is counted under: the source's, or `OTHERS`. `news` is how many
-    were just added to the count: the first time, the whole run.
-    """
-
-    source: str
-    run: int
-    behind_s: float
-    counted_as: str
-    news: int = 1
-
-    def __str__(self) -> str:
-        """The text for the operator."""
-        return (
-            f"{self.run} observations in a row from source {self.source!r} are older than its own "
-            f"earlier ones, the last by {self.behind_s:.0f} s: what is newer stays, they only "
-            "enter the history. Has its clock gone back?"
-        )
-
-
 @dataclass(slots=True)
 class _Stream:
     newest_ns: int
@@ -131,10 +109,11 @@ class Lateness:
 
     def see(
         self, source: str, kind: int, stamp_ns: int, *, was_latched: bool, now_s: float
-    ) -> Late | None:
-        """Note a new observation; returns the run of late ones that it belongs to, if it is long.
+    ) -> Drop | None:
+        """Note a new observation; reports the run of late ones that it belongs to, if it is long.
 
-        `was_latched`: it was published well before it was received.
+        It counts what is new since the last report: the first time, the whole run. `was_latched`:
+        it was published well before it was received.
         """
         stream = self._streams.setdefault((source, kind), _Stream(stamp_ns))
         self._streams.move_to_end((source, kind))
@@ -150,8 +129,13 @@ class Lateness:
         if stream.run <= FEW:
             return None
         news = stream.run if stream.run == FEW + 1 else 1
+        why = (
+            f"{stream.run} observations in a row from source {source!r} are older than its own "
+            f"earlier ones, the last by {(stream.newest_ns - stamp_ns) / 1e9:.0f} s: what is newer "
+            "stays, they only enter the history. Has its clock gone back?"
+        )
         name = self._count(source, news)
-        return Late(source, stream.run, (stream.newest_ns - stamp_ns) / 1e9, name, news)
+        return Drop(Reason.LATE_STAMP, why, "late stamps", case=name, count=news)
 
     def clamp_to(self, now_ns: int) -> None:
         """Follow ROS time that went back for everybody: no source is late because of it."""

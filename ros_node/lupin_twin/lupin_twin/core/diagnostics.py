@@ -22,7 +22,6 @@ MAX_SHOWN: Final = 500
 STATE_TOPIC: Final = "state topic"
 
 _REASONS: Final = tuple(reason.value for reason in Reason)
-_LOST: Final = Reason.LOST.value
 _RECENTLY: Final = "recently: "
 _LAST: Final = "last: "
 _ERRORS: Final = "callback errors"
@@ -169,24 +168,18 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding("origin", OK, _ORIGIN[health.origin], {"origin": health.origin})
     yield _inputs(health)
     counts = health.counts
-    recent = [drop for drop in counts.recent if drop.reason != _LOST]
+    recent = counts.recent
     yield Finding(
         "drops",
         WARN if recent or counts.callback_errors else OK,
         "; ".join(f"{drop.count} recently: {shown(drop.message)}" for drop in recent)
         or "nothing recently",
         {
-            **{str(why): str(count) for why, count in counts.dropped.items() if why != _LOST},
-            **_recent_readings(recent),
+            **{str(why): str(count) for why, count in counts.dropped.items()},
+            **{_RECENTLY + drop.reason: str(drop.count) for drop in recent},
+            **{_LAST + drop.reason: shown(drop.message) for drop in recent},
             _ERRORS: str(counts.callback_errors),
         },
-    )
-    lost = [drop for drop in counts.recent if drop.reason == _LOST]
-    yield Finding(
-        "queues",
-        WARN if lost else OK,
-        f"{lost[0].count} messages lost recently" if lost else "nothing lost recently",
-        {_LOST: str(counts.dropped.get(_LOST, 0)), **_recent_readings(lost)},
     )
     late = {shown(source): str(count) for source, count in health.late.items()}
     yield Finding(
@@ -250,14 +243,6 @@ def _inputs(health: Health) -> Finding:
     return Finding("inputs", OK, "all inputs have publishers", values)
 
 
-def _recent_readings(recent: Iterable[Recent]) -> dict[str, str]:
-    values = {}
-    for drop in recent:
-        values[_RECENTLY + drop.reason] = str(drop.count)
-        values[_LAST + drop.reason] = shown(drop.message)
-    return values
-
-
 def shown(text: str) -> str:
     """The text, cut to `MAX_SHOWN` characters."""
     return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
@@ -294,15 +279,15 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
         for number in range(1, MAX_PROBLEMS + 1)
         if (key := f"{_PROBLEM}{number}") in inputs
     )
-    both = {**values.get("drops", {}), **values.get("queues", {})}
+    drops = values.get("drops", {})
     recent = tuple(
-        Recent(reason, shown(both.get(_LAST + reason, "")), count)
+        Recent(reason, shown(drops.get(_LAST + reason, "")), count)
         for reason in _REASONS
-        if (count := _number(both, _RECENTLY + reason))
+        if (count := _number(drops, _RECENTLY + reason))
     )
     counts = Counts(
-        MappingProxyType({why: count for why in _REASONS if (count := _number(both, why))}),
-        _number(both, _ERRORS),
+        MappingProxyType({why: count for why in _REASONS if (count := _number(drops, why))}),
+        _number(drops, _ERRORS),
         recent,
     )
     return SelfReport(clock, counts if "drops" in values else None, journal, origin, problems)

@@ -137,19 +137,20 @@ class DropCounts:
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """A dropped message or entry: `what` it was, and `why`, in words that name the value.
+    """What is counted by a reason: `what` happened, and `why`, in words that name the value.
 
     `case` separates cases of one reason that must not hide each other; it is of a small set.
     """
 
     reason: Reason
     why: str
-    what: str = "a message"
+    what: str = "dropped a message"
     case: str = ""
+    count: int = 1
 
     def on(self, topic: str) -> str:
         """The text for the operator."""
-        return f"dropped {self.what} on {topic}: {self.why}"
+        return f"{self.what} on {topic}: {self.why}"
 
 
 class Throttle:

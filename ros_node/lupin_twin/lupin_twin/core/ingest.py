@@ -57,7 +57,7 @@ def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspec
     if sent is None:
         name = "KIND_ANOMALY" if received.kind == KIND_ANOMALY else "an unknown kind"
         why = f"kind {received.kind} ({name}) is not a tag's"
-        return Drop(Reason.KIND, why, "an observation", case=str(received.kind))
+        return Drop(Reason.KIND, why, "dropped an observation", case=str(received.kind))
     if dropped := wrong_frame(received.frame_id, frame_id) or no_tag_id(sent.tag_id):
         return dropped
     # Without a stamp in the header, a scan's time is when the sensors were read.
@@ -95,7 +95,7 @@ def discoveries(
         elif not is_pinned(tag_id):
             pose = discovered_pose(sent_pose())
             yield (
-                Drop(Reason.POSE, "its pose is not finite", f"tag {tag_id[:_QUOTED]!r}")
+                Drop(Reason.POSE, "its pose is not finite", f"dropped tag {tag_id[:_QUOTED]!r}")
                 if pose is None
                 else Pin(tag_id, pose)
             )
@@ -137,7 +137,7 @@ def near(write: Write | Drop, max_pose_m: float) -> tuple[Write | None, Drop | N
         return write, None
     for axis, metres in (("x", pose.x), ("y", pose.y), ("z", pose.z)):
         if abs(metres) > max_pose_m:
-            what = f"the pose of tag {write.tag_id[:_QUOTED]!r}"
+            what = f"dropped the pose of tag {write.tag_id[:_QUOTED]!r}"
             why = f"its {axis} is {metres:g} m, the limit is {max_pose_m:g} m (max_pose_m)"
             left = None if isinstance(write, Pin) else replace(write, pose=None)
             return left, Drop(Reason.POSE, why, what, case="far")
@@ -153,7 +153,7 @@ def wrong_frame(frame_id: str, expected: str) -> Drop | None:
 
 def no_tag_id(tag_id: str) -> Drop | None:
     """Return a drop if the id is empty."""
-    return None if tag_id else Drop(Reason.TAG_ID, "its tag_id is empty", "an entry")
+    return None if tag_id else Drop(Reason.TAG_ID, "its tag_id is empty", "dropped an entry")
 
 
 def observed_at(stamp_ns: int, now_ns: int) -> int:

@@ -27,14 +27,13 @@ from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_twin.core import ingest
-from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
 from lupin_twin.core.drops import Counts, Drop, DropCounts, Reason, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import convert
-from lupin_twin.ros.inputs import Input, TwinCount
+from lupin_twin.ros.inputs import Input
 from lupin_twin.ros.message_limits import MessageShape, TooManyError
 from lupin_twin.ros.parameters import naming
 from lupin_twin.runtime import process
@@ -48,6 +47,9 @@ WORK_DRAIN_S: Final = 1.0
 # of the fifty that may wait do so by then. The thread then counts as behind for `BELIEVED_S`.
 BEHIND_S: Final = 0.05
 BELIEVED_S: Final = 0.25
+# A twin that has died stays in DDS's graph for 20 s (the lease). A twin restarted in its place must
+# not count as a second one.
+LEFT_OVER_S: Final = 30.0
 # The default of ROS, reliable and volatile, except for the depth.
 SERVICE_QOS: Final = QoSProfile(depth=SERVICE_DEPTH)
 # Without rclpy's default warnings about subscribers that do not match, which log the same warning
@@ -103,7 +105,7 @@ def read_message(
     except TooManyError as error:
         return Drop(Reason.SIZE, str(error))
     except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
-        return Drop(Reason.UNREADABLE, str(error), "an unreadable message")
+        return Drop(Reason.UNREADABLE, str(error), "dropped an unreadable message")
 
 
 class NodeUtilities:
@@ -119,6 +121,9 @@ class NodeUtilities:
         self._inputs: list[Input] = []
         # As of the last `check_inputs`.
         self.input_problems: tuple[str, ...] = ()
+        # The twins that publish one state, see `check_twins`.
+        self.twins = 1
+        self._several_since_s = math.inf
         self._drains: list[Callable[[], None]] = []
         self._behind_until_s = -math.inf
         self._throttle = Throttle(WARNING_PERIOD_S)
@@ -163,7 +168,8 @@ class NodeUtilities:
             if depth > 1 and number is not None and is_wanted is None:
                 lost = source.gaps.see(number, lambda: int(self.node.count_publishers(name)))
                 if lost:
-                    self.lose(lost, name)
+                    what = f"lost {lost} messages"
+                    self.drop(Drop(Reason.LOST, "they arrived too fast", what, count=lost), name)
             message = read_message(data, shape)
             if isinstance(message, Drop):
                 self.drop(message, name)
@@ -290,22 +296,25 @@ class NodeUtilities:
         try:
             new = convert.map_of(msg, 0)
         except ValueError as error:
-            self.drop(Drop(Reason.MAP, f"{error}; the previous one stays", "a map"), topic)
+            self.drop(Drop(Reason.MAP, f"{error}; the previous one stays", "dropped a map"), topic)
             return None
         return None if before is not None and new.shows_the_same_as(before) else new
 
-    def check_twins(self, twins: TwinCount, topic: str, what: str) -> None:
+    def check_twins(self, topic: str, what: str) -> None:
         """Count the publishers of a twin's state; warns if several; `what` is the consequence."""
-        if twins.see(int(self.node.count_publishers(topic)), time.monotonic()):
+        publishers, now_s = int(self.node.count_publishers(topic)), time.monotonic()
+        self._several_since_s = min(self._several_since_s, now_s) if publishers > 1 else math.inf
+        self.twins = publishers if now_s - self._several_since_s >= LEFT_OVER_S else 1
+        if self.twins > 1:
             self.warn(
                 ("twins", 0),
-                f"{twins.value} nodes publish {topic}: {what}; "
+                f"{self.twins} nodes publish {topic}: {what}; "
                 "stop all twins but one, or give them ROS domains of their own",
             )
 
     def drop(self, drop: Drop, topic: str) -> None:
-        """Count and report something that was dropped."""
-        self._drops.add(drop.reason.value, drop.on(topic), time.monotonic())
+        """Count and report something that was dropped, lost or late."""
+        self._drops.add(drop.reason.value, drop.on(topic), time.monotonic(), drop.count)
         self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
 
     @property
@@ -316,18 +325,6 @@ class NodeUtilities:
     def counts(self) -> Counts:
         """Return all drops, losses and errors so far."""
         return self._drops.value(time.monotonic())
-
-    def lose(self, count: int, topic: str) -> None:
-        """Count and report messages that came faster than they were read."""
-        text = f"messages on {topic} arrived too fast"
-        self._drops.add(Reason.LOST.value, text, time.monotonic(), count)
-        self.warn((Reason.LOST, topic), f"lost {count} messages on {topic}: they arrived too fast")
-
-    def late(self, late: Late, topic: str) -> None:
-        """Count and report a producer whose stamps stay behind its own earlier ones."""
-        text = f"late stamps on {topic}: {late}"
-        self._drops.add(Reason.LATE_STAMP.value, text, time.monotonic(), late.news)
-        self.warn((Reason.LATE_STAMP, late.counted_as), text)
 
     def warn(self, key: tuple[str, object], text: str) -> None:
         """Log a warning, at most one a period for each key, and how many were held back."""

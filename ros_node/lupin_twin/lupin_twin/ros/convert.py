@@ -77,7 +77,8 @@ def diagnostics(findings: Iterable[Finding], node: str, now_ns: int) -> Any:
 
 def findings_of(msg: Any, state_topic: str) -> Iterator[Finding]:
     """The findings of the twin that publishes `state_topic`, a name from the root on."""
-    node = _node_of(msg, state_topic)
+    mark = KeyValue(key=STATE_TOPIC, value=state_topic)
+    node = next((str(it.hardware_id) for it in msg.status if mark in it.values), None)
     begin = f"{node}: "
     for status in msg.status:
         if status.hardware_id == node and status.name.startswith(begin):
@@ -87,13 +88,6 @@ def findings_of(msg: Any, state_topic: str) -> Iterator[Finding]:
                 message=status.message,
                 values={each.key: each.value for each in status.values},
             )
-
-
-def _node_of(msg: Any, state_topic: str) -> str | None:
-    for status in msg.status:
-        if any(each.key == STATE_TOPIC and each.value == state_topic for each in status.values):
-            return str(status.hardware_id)
-    return None
 
 
 UINT16_MAX: Final = 65_535

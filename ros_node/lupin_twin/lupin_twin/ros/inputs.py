@@ -171,29 +171,3 @@ def name_of(publisher: Any) -> str:
     if publisher.node_name == _NO_NAME:
         return "somebody"
     return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
-
-
-# A twin that has died stays in DDS's graph for 20 s (the lease). A twin restarted in its place must
-# not count as a second one.
-LEFT_OVER_S: Final = 30.0
-
-
-class TwinCount:
-    """Counts the twins that publish one state: several only if the graph shows them for long."""
-
-    def __init__(self) -> None:
-        self.value = 1
-        self._since_s: float | None = None
-
-    def see(self, publishers: int, now_s: float) -> bool:
-        """Note how many publishers the graph shows; returns whether there are several twins.
-
-        `value` is the count to believe in; `now_s` is seconds of a clock that never jumps.
-        """
-        if publishers <= 1:
-            self._since_s = None
-        elif self._since_s is None:
-            self._since_s = now_s
-        is_several = self._since_s is not None and now_s - self._since_s >= LEFT_OVER_S
-        self.value = publishers if is_several else 1
-        return is_several

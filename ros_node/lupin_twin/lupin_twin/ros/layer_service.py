@@ -125,7 +125,7 @@ class LayerService:
     def _begin(self, topic: _Topic, now_s: float) -> None:
         try:
             work = topic.plan(topic)
-        except FieldRefused as error:
+        except ValueError as error:  # a field that is refused
             self._refuse(topic, error)
             return
         if work is not None:

@@ -30,7 +30,6 @@ from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NO_EVENTS, NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
-from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.layer_service import LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.ros.services import Responses, Services
@@ -62,7 +61,6 @@ class TwinNode(AdjustableNode):
         self.lateness = Lateness()
         self.rules = FieldRules.of(self.parameters)
         self.occupancy_map: OccupancyMap | None = None
-        self.twins = TwinCount()
         self._clock_watch = ClockWatch()
         self._observed_s: float | None = None
         self._clock_subscription: Any = None
@@ -213,7 +211,7 @@ class TwinNode(AdjustableNode):
             now_s=time.monotonic(),
         )
         if late is not None:
-            self.utilities.late(late, topic)
+            self.utilities.drop(late, topic)
 
     def _on_discovered_tags(self, msg: Any) -> None:
         topic = self._topics["discovered_tags_topic"]
@@ -258,7 +256,7 @@ class TwinNode(AdjustableNode):
             inputs={topic: int(self.count_publishers(topic)) for topic in self._topics.values()},
             observed_ago_s=None if self._observed_s is None else now_s - self._observed_s,
             late=self.lateness.counts,
-            twins=self.twins.value,
+            twins=self.utilities.twins,
             state_topic=self._state_publisher.topic_name,
             fields_computing=self._twin_services.fields.waiting,
             fields_computed=self._twin_services.fields.answered,
@@ -279,7 +277,7 @@ class TwinNode(AdjustableNode):
         self.utilities.drain()
         self._times_publisher.publish(self._states.times(snapshot))
         topic = self._state_publisher.topic_name
-        self.utilities.check_twins(self.twins, topic, "consumers get a mixture")
+        self.utilities.check_twins(topic, "consumers get a mixture")
 
     @property
     def _clock_state(self) -> ClockState:

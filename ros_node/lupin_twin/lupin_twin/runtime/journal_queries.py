@@ -9,8 +9,9 @@ from __future__ import annotations
 import sqlite3
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -93,7 +94,12 @@ class Recall:
             raise NotRemembered(f"{condition.detail}: {then}")
         path = Path(condition.path)
         try:
-            answer = self._run(path, condition.inode, search, should_stop)
+            with self._reading(path, condition.inode) as connection:
+                connection.set_progress_handler(should_stop, _STEPS)
+                connection.execute("BEGIN")
+                answer = search(connection, should_stop)
+                connection.execute("ROLLBACK")
+                connection.set_progress_handler(None, _STEPS)
         except (*FILE_ERRORS, Foreign, OSError) as error:
             if not should_stop():
                 if is_damage_error(error):
@@ -106,27 +112,27 @@ class Recall:
             raise CancelledError
         raise NotRemembered(f"the journal did not answer within {self._max_s:g} s; ask for less")
 
-    def _run(
-        self, path: Path, inode: int, search: Search[AnswerT], should_stop: ShouldStop
-    ) -> AnswerT:
+    @contextmanager
+    def _reading(self, path: Path, inode: int) -> Iterator[sqlite3.Connection]:
+        """A connection that nobody else uses meanwhile; without an error, it is used again."""
         with self._changed:
             if self._is_closed:
                 raise NotRemembered("the twin is ending")
             self._running += 1
-        opened = None
+        opened: _Open | None = None
         try:
             opened = self._take(path, inode)
-            connection, _ = opened
-            connection.set_progress_handler(should_stop, _STEPS)
-            connection.execute("BEGIN")
-            answer = search(connection, should_stop)
-            connection.execute("ROLLBACK")
-            connection.set_progress_handler(None, _STEPS)
-        except BaseException:
-            self._put_back(opened, is_sound=False)
-            raise
-        self._put_back(opened, is_sound=True)
-        return answer
+            yield opened[0]
+            with self._changed:
+                if not self._is_closed:
+                    self._idle.append(opened)
+                    opened = None
+        finally:
+            if opened is not None:
+                opened[0].close()
+            with self._changed:
+                self._running -= 1
+                self._changed.notify_all()
 
     def _take(self, path: Path, inode: int) -> _Open:
         status = path.stat()
@@ -137,24 +143,13 @@ class Recall:
                 f"the journal {path} was replaced; the twin opens the new one within seconds"
             )
         files = files_of(path)
-        while True:
-            with self._changed:
-                opened = self._idle.pop() if self._idle else None
-            if opened is None:
-                break
-            if opened[1] == files:
-                return opened
-            opened[0].close()
-        return open_reader(path), files
-
-    def _put_back(self, opened: _Open | None, *, is_sound: bool) -> None:
         with self._changed:
-            if opened is not None and is_sound and not self._is_closed:
-                self._idle.append(opened)
-            elif opened is not None:
+            while self._idle:
+                opened = self._idle.pop()
+                if opened[1] == files:
+                    return opened
                 opened[0].close()
-            self._running -= 1
-            self._changed.notify_all()
+        return open_reader(path), files
 
 
 def _why_not(path: Path, error: Exception) -> Exception:

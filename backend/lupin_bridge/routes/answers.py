@@ -387,18 +387,6 @@ async def computed(
     return answer
 
 
-async def respond_computed(
-    request: Request,
-    key: Hashable,
-    write: Callable[[ShouldStop], Answer],
-    cost_s: float,
-    etag: str | None = None,
-) -> Response:
-    """`respond` with an answer that is `computed`."""
-    bridge, client = bridge_of(request), client_of(request)
-    return await respond(request, key, lambda: computed(bridge, client, key, write, cost_s), etag)
-
-
 # --- answers of the past --------------------------------------------------------------------------
 
 

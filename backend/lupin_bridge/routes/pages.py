@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection
-from functools import cache
+from functools import cache, partial
 from html import escape
 from pathlib import Path
 from typing import Final
@@ -22,13 +22,14 @@ from lupin_bridge.field import listed
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     ApiRoute,
+    computed,
     error_response,
     json_response,
     list_header,
     person_of,
     read_body,
     read_route,
-    respond_computed,
+    respond,
     while_client_waits,
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer
@@ -70,7 +71,8 @@ async def openapi(request: Request) -> Response:
 
     if app.state.bridge is None:
         return json_response(write(None).body, headers=REVALIDATE)
-    return await respond_computed(request, key, write, _WRITE_S)
+    compute = partial(computed, app.state.bridge, client_of(request), key, write, _WRITE_S)
+    return await respond(request, key, compute)
 
 
 # --- the guide -----------------------------------------------------------------------------------

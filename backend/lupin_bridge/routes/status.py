@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from functools import partial
 from itertools import islice
 from typing import Final
 
@@ -24,6 +25,7 @@ from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     ApiRoute,
     bridge_of,
+    computed,
     error_response,
     has_etag,
     json_response,
@@ -34,7 +36,6 @@ from lupin_bridge.routes.answers import (
     refusing,
     respond,
     respond_as_of,
-    respond_computed,
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream import routes_schema, schema
@@ -145,9 +146,12 @@ async def _map(request: Request, kind: str) -> Response:
             return not_modified(etag)
         return Response(map_json(occupancy), headers=headers, media_type="application/json")
     cost_s = occupancy.cells.size * _DRAW_CELL_S
-    return await respond_computed(
-        request, etag, lambda _: Answer(map_png(occupancy), "image/png", headers), cost_s, etag
-    )
+
+    def write(_: object) -> Answer:
+        return Answer(map_png(occupancy), "image/png", headers)
+
+    compute = partial(computed, bridge, client_of(request), etag, write, cost_s)
+    return await respond(request, etag, compute, etag)
 
 
 @read_route(

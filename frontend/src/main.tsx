@@ -20,7 +20,7 @@ import './styles/forced.css';
 import { startAlarmsAndAnnouncements } from './alarms/watch';
 import { startAddress } from './store/address';
 import { onChange, prefer, store } from './store/app';
-import { cycleSetting, startCycle } from './store/cycle';
+import { cycleSeconds, startCycle } from './store/cycle';
 import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
 import { startLoaders, startSensors } from './store/loaders';
@@ -41,12 +41,12 @@ onChange(
 );
 
 const kiosk = new URLSearchParams(window.location.search).has('kiosk');
-const cycle = cycleSetting(window.location.search);
+const cycle = cycleSeconds(window.location.search);
 
 document.documentElement.lang = LANGUAGE;
 document.title = S.product;
 startTheme();
-startAddress(kiosk, cycle.seconds !== null);
+startAddress(kiosk, cycle !== null);
 startSensors();
 startLoaders();
 startAlarmsAndAnnouncements(storage);
@@ -81,7 +81,7 @@ if (!root) throw new Error('index.html has no #root');
 createRoot(root).render(
   <StrictMode>
     <ErrorBoundary>
-      <App kiosk={kiosk} cycle={cycle} />
+      <App kiosk={kiosk} />
     </ErrorBoundary>
   </StrictMode>,
 );

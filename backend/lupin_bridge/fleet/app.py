@@ -88,7 +88,7 @@ _TIDY_S: Final = 5.0
 _CACHE_BYTES: Final = 4_000_000
 # Least, and greatest, time between two frames to a browser.
 _FRAME_S: Final = 1.0
-_HEARTBEAT_S: Final = 5.0
+_HEARTBEAT_S: Final = 3.0
 # The routes for signing in, and of the sensors in force.
 _AS_EVERYWHERE: Final = frozenset(
     {

@@ -3,7 +3,7 @@ import { useMemo, useRef, useState } from 'react';
 import { now, pause } from '../clock';
 import { type Catalogue, isHad, isMeasured } from '../domain/sensors';
 import { endsNow, spanOf } from '../domain/time';
-import { type AppState, store, useApp } from '../store/app';
+import { type AppState, store, useApp, useContent } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { useFetched } from '../store/fetcher';
@@ -34,9 +34,9 @@ export function useCharts(
   const moment = useApp((state) => state.view.moment);
   const catalogue = useApp(selectCatalogue);
   const both = useApp(selectCatalogues);
-  const species = useApp((state) =>
-    tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
-  ).split('\u0000');
+  const species = useContent((state) =>
+    tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? ''),
+  );
   const period = useApp((state) => state.view.period);
   const { value: known, state: reaching } = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
@@ -117,20 +117,17 @@ export function useChosenSensor(): string {
  */
 export function useSensorsOf(tagId: string): readonly string[] {
   const chosen = useChosenSensor();
-  const names = useApp((state) => {
+  const names = useContent((state): readonly string[] => {
     const readings = selectTag(state, tagId)?.readings;
-    if (!readings) return '';
+    if (!readings) return [];
     const computed = [state.view.sensor, chosen].filter((name) => {
       const sensor = selectCatalogue(state).named(name);
       return !isMeasured(sensor) && isHad(sensor, (each) => readings.has(each));
     });
-    return [...new Set([...readings.keys(), ...computed])].join('\u0000');
+    return [...new Set([...readings.keys(), ...computed])];
   });
   const catalogue = useApp(selectCatalogue);
-  return useMemo(
-    () => inOrder(catalogue, names === '' ? [] : names.split('\u0000')),
-    [catalogue, names],
-  );
+  return useMemo(() => inOrder(catalogue, names), [catalogue, names]);
 }
 
 function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[] {

@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { onLapse } from '../clock';
+import { parseFrame, statusOf } from '../contract/frames';
 import type { Frame } from '../contract/types';
 import { status } from '../testing/page';
 import { stateFrame } from '../testing/tags';
@@ -47,6 +48,8 @@ beforeEach(() => {
   refusals = 0;
   bad = [];
   link = connect('ws://test/ws/state', {
+    parse: parseFrame,
+    statusOf,
     onConnection: (connection: Connection) => {
       const phase = phaseOf(connection, performance.now());
       if (phases.at(-1) !== phase) phases.push(phase);

@@ -1,7 +1,7 @@
 import { now } from '../clock';
 import { route } from '../contract/api';
-import { parseFrame } from '../contract/frames';
-import type { Frame } from '../contract/types';
+import type { Parsed } from '../contract/frames';
+import type { StatusFrame } from '../contract/types';
 import {
   type Connection,
   type ConnectionEvent,
@@ -11,12 +11,15 @@ import {
   step,
 } from './machine';
 
-interface ConnectionHandlers {
+interface ConnectionHandlers<Frame> {
+  readonly parse: (data: unknown) => Parsed<Frame>;
+  /** Null for a state frame; undefined for one that only shows that the server is alive. */
+  readonly statusOf?: (frame: Frame) => StatusFrame | null | undefined;
   /** The connection changed, or a deadline passed and its phase may have changed. */
   readonly onConnection: (connection: Connection) => void;
   readonly onFrame: (frame: Frame, connection: Connection) => void;
   /** A message that violates the contract was dropped; `why` says how. */
-  readonly onBad: (why: string) => void;
+  readonly onBad?: (why: string) => void;
   /** A socket closed without opening: the server is down, or requires sign-in. */
   readonly onRefused: () => void;
 }
@@ -24,7 +27,7 @@ interface ConnectionHandlers {
 export type Link = ReturnType<typeof connect>;
 
 /** Runs `machine.ts` with one socket, one timer and the browser's wake-up events. */
-export function connect(url: string, handlers: ConnectionHandlers) {
+export function connect<Frame>(url: string, handlers: ConnectionHandlers<Frame>) {
   let connection = INITIAL;
   let socket: WebSocket | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -74,17 +77,18 @@ export function connect(url: string, handlers: ConnectionHandlers) {
     own.onmessage = ({ data }) => {
       const at = look();
       if (at === null) return;
-      const parsed = parseFrame(data);
+      const parsed = handlers.parse(data);
       if (parsed.kind === 'passed over') return;
       if (parsed.kind === 'bad') {
         // It may have been a delta.
-        handlers.onBad(parsed.why);
+        handlers.onBad?.(parsed.why);
         send({ type: 'broken', now: at });
         return;
       }
       const { frame } = parsed;
-      if (frame.type === 'alarms' || frame.type === 'robot') send({ type: 'received', now: at });
-      else send({ type: 'frame', now: at, status: frame.type === 'status' ? frame : null });
+      const status = handlers.statusOf?.(frame);
+      if (status === undefined) send({ type: 'received', now: at });
+      else send({ type: 'frame', now: at, status });
       if (look() === null) return;
       handlers.onFrame(frame, connection);
     };

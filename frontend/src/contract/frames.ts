@@ -6,23 +6,30 @@ import type {
   Latest,
   Schemas,
   StateFrame,
+  StatusFrame,
   TwinTagState,
 } from './types';
 
 /** "passed over": a type from a later server. */
-type Parsed =
-  | { readonly kind: 'frame'; readonly frame: Frame }
+export type Parsed<F> =
+  | { readonly kind: 'frame'; readonly frame: F }
   | { readonly kind: 'passed over' }
   | { readonly kind: 'bad'; readonly why: string };
 
 /** The server's tests compare its frames with the schemas that the types here are from. */
-export function parseFrame(data: unknown): Parsed {
+export function parseFrame(data: unknown): Parsed<Frame> {
   try {
     const frame = filled(JSON.parse(String(data)) as Frame);
     return frame ? { kind: 'frame', frame } : { kind: 'passed over' };
   } catch (error) {
     return { kind: 'bad', why: String(error) };
   }
+}
+
+/** Null for a state; undefined for what says neither how the twin is nor what it knows. */
+export function statusOf(frame: Frame): StatusFrame | null | undefined {
+  if (frame.type === 'status') return frame;
+  return frame.type === 'state' || frame.type === 'delta' ? null : undefined;
 }
 
 function filled(frame: Frame): Frame | null {

@@ -5,9 +5,6 @@ import { clockText, minuteText } from './format';
 import type { Shared } from './memo';
 import { countText, dayFormat, secondsOf, type Span } from './time';
 
-/** The events of one bucket, with its beginning, ROS seconds. */
-export type Happened = Timeline['buckets'][number];
-
 export type Timeline = Shared<ReturnType<typeof timelineOf>>;
 
 export const spanOfWire = ({ from, to }: WireTimeline['silences'][number]): Span => ({

@@ -1,3 +1,7 @@
+import { useState } from 'react';
+
+import { retainEqual } from '../domain/memo';
+import { equal } from '../domain/twin';
 import type { Size, View } from '../geometry/coordinates';
 import { type Change, changed, createStore, useSelected } from './create';
 import { createFetcher, type FetcherOptions, type FetchTask } from './fetcher';
@@ -84,4 +88,13 @@ export function keepFetched<T>(
 
 export function useApp<Part>(select: (state: AppState) => Part): Part {
   return useSelected(store, select);
+}
+
+/** The same for a part that each state makes anew: it renders only when its content changes. */
+export function useContent<Part extends object | null>(select: (state: AppState) => Part): Part {
+  const [retain] = useState(() => retainEqual<object>(equal));
+  return useApp((state) => {
+    const part = select(state);
+    return part && (retain(part) as Part);
+  });
 }

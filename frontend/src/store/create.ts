@@ -62,11 +62,11 @@ export const announce = (voice: Store<Announcement>, text: string): void => {
   voice.set({ text, key: voice.get().key + 1 });
 };
 
-/** Who is signed in; null: not known yet. */
+/** The session, with who is signed in, if people sign in here; null: not known yet. */
 export const person = createStore<Session | null>(null);
 
 /** With sign-in, users who may write notes acknowledge and shelve; otherwise each browser for itself. */
-export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? true;
+export const mayAct = (who: Session | null): boolean => !who?.name || who.can_write_notes;
 
 /** A note is withdrawn by who wrote it, or by an admin. */
 export const mayWithdraw = (who: Session | null, by: string | null): boolean =>

@@ -1,10 +1,10 @@
-import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { showTags } from '../testing/page';
 import { CATALOGUE } from '../testing/sensors';
 import { readings, tag, wireTag } from '../testing/tags';
 import { act, store } from './app';
-import { addressOfPage, cycleSetting, sensorsOf, startCycle } from './cycle';
+import { addressOfPage, cycleSeconds, sensorsOf, startCycle } from './cycle';
 import { DEFAULT_VIEW } from './view';
 
 let stop: () => void;
@@ -29,7 +29,7 @@ const pass = (seconds: number): void => {
 };
 
 test('shows each sensor that exists for as long as was wished', () => {
-  stop = startCycle({ seconds: 30, refused: null });
+  stop = startCycle(30);
   pass(29.9);
   expect(inView()).toBe('temperature');
   act({ moment: 500 });
@@ -44,37 +44,26 @@ test('shows each sensor that exists for as long as was wished', () => {
 });
 
 test('one sensor stays, and without a wish nothing changes', () => {
-  stop = startCycle({ seconds: null, refused: 'soon' });
+  stop = startCycle(null);
   pass(10_000);
   expect(inView()).toBe('temperature');
   stop();
   showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-  stop = startCycle({ seconds: 5, refused: null });
+  stop = startCycle(5);
   pass(10);
   expect(inView()).toBe('temperature');
 });
 
-describe('the wish', () => {
-  test.each(['5', '30', '3600'])('%s seconds are taken', (text) => {
-    expect(cycleSetting(`?kiosk=1&cycle=${text}`)).toEqual({
-      seconds: Number(text),
-      refused: null,
-    });
-  });
-
-  test.each(['4', '3601', '', '-30', '30.5', '3e1', 'soon', 'NaN', '99999'])(
-    '“%s” is refused, and said',
-    (text) => {
-      expect(cycleSetting(`?cycle=${encodeURIComponent(text)}`)).toEqual({
-        seconds: null,
-        refused: text,
-      });
-    },
-  );
-
-  test('none is no mistake', () => {
-    expect(cycleSetting('?kiosk=1')).toEqual({ seconds: null, refused: null });
-  });
+test.each([
+  ['?kiosk=1&cycle=30', 30],
+  ['?cycle=4', 5],
+  ['?cycle=-30', 5],
+  ['?cycle=99999', 3_600],
+  ['?cycle=soon', null],
+  ['?cycle=', null],
+  ['?kiosk=1', null],
+])('the wish “%s” is for %s seconds', (search, seconds) => {
+  expect(cycleSeconds(search)).toBe(seconds);
 });
 
 test('a round has the sensors that some tag has, in their usual order, failed ones too', () => {

@@ -5,16 +5,10 @@ import { act, store } from './app';
 import { selectSensors } from './derived';
 import { selectTags } from './moment';
 
-export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
-
-export type CycleSetting = ReturnType<typeof cycleSetting>;
-
-/** The setting in an address: `?kiosk=1&cycle=30`. `seconds` per sensor; null: it stays. An invalid one is `refused`. */
-export function cycleSetting(search: string) {
-  const text = new URLSearchParams(search).get('cycle');
-  const seconds = text !== null && /^\d{1,4}$/.test(text) ? Number(text) : NaN;
-  const isAllowed = seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most;
-  return { seconds: isAllowed ? seconds : null, refused: isAllowed ? null : text };
+/** Seconds per sensor in an address, `?kiosk=1&cycle=30`, from 5 to 3,600; null: the sensor stays. */
+export function cycleSeconds(search: string): number | null {
+  const seconds = parseInt(new URLSearchParams(search).get('cycle') ?? '', 10);
+  return Number.isNaN(seconds) ? null : Math.min(3_600, Math.max(5, seconds));
 }
 
 export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): readonly Sensor[] =>
@@ -36,7 +30,7 @@ export function addressOfPage(search: string, hash: string): string {
   return `?${rest}${hash}`;
 }
 
-export function startCycle({ seconds }: CycleSetting): () => void {
+export function startCycle(seconds: number | null): () => void {
   if (seconds === null) return () => undefined;
   const timer = setInterval(() => {
     const state = store.get();

@@ -1,6 +1,6 @@
 /** The page's one connection, and how its frames change the store. */
 import { now, onLapse } from '../clock';
-import { latestAfter } from '../contract/frames';
+import { latestAfter, parseFrame, statusOf } from '../contract/frames';
 import { connect, type Link, signInIfRequired } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
@@ -62,6 +62,8 @@ export function startLive(): () => void {
   };
 
   const link = connect(stateSocketUrl(), {
+    parse: parseFrame,
+    statusOf,
     onConnection: (connection) => receive(withConnection(connection, now())),
     onRefused: () => void signInIfRequired(),
     onBad: reportBad,

@@ -8,8 +8,8 @@ import { failed, NOTHING, ready } from './fetcher';
 import { rosNow, selectLatest } from './moment';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
-/** Enough for the widest bar, where a bucket is two or three pixels. */
-const BUCKETS = 240;
+/** A bucket is nearly two pixels wide on a phone, and a few on the widest bar. */
+const BUCKETS = 180;
 const INTERVAL_MS = 1_000;
 /** Refetched once per bucket, within these bounds, seconds. */
 const SOONEST_S = 5;

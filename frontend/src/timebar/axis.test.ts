@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import type { Happened } from '../domain/timeline';
+import type { Timeline } from '../domain/timeline';
 import { timelineWith } from '../testing/timeline';
 import {
   type Axis,
@@ -56,7 +56,10 @@ test('a step goes from where it stands, ends at now, and does not leave the bar 
 describe('columns', () => {
   const AXIS: Axis = { from: 100, to: 200, width: 1_000 };
 
-  const bucket = (start: number, over: Partial<Happened> = {}): Happened => ({
+  const bucket = (
+    start: number,
+    over: Partial<Timeline['buckets'][number]> = {},
+  ): Timeline['buckets'][number] => ({
     start,
     scans: 0,
     failures: 0,
@@ -75,29 +78,6 @@ describe('columns', () => {
     );
     expect(first).toMatchObject({ x: 0, width: 10, start: 100, end: 101, scanHeight: 0.5 });
     expect(second).toMatchObject({ x: 500, scanHeight: 1, failureHeight: 0.25 });
-  });
-
-  test('narrow ones are added up until they can be told apart', () => {
-    const narrow = { ...AXIS, width: 100 };
-    const columns = columnsOf(
-      timelineWith({
-        buckets: [
-          bucket(100, { scans: 1, pests_seen: 1 }),
-          bucket(102, { scans: 2, pests_cleared: 2, looks: 3 }),
-          bucket(103, { scans: 5 }),
-        ],
-      }),
-      narrow,
-    );
-    expect(columns).toHaveLength(2);
-    expect(columns[0]).toMatchObject({
-      scans: 3,
-      pests_seen: 1,
-      pests_cleared: 2,
-      looks: 3,
-      width: 3,
-    });
-    expect(columns[1]).toMatchObject({ scans: 5, x: 3 });
   });
 
   test('one scan beside ten thousand can still be seen', () => {

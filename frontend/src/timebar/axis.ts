@@ -1,6 +1,6 @@
 /** Maps moments to positions on the time bar, and lays out its columns. Pure. */
 import type { Span } from '../domain/time';
-import type { Happened, Timeline } from '../domain/timeline';
+import type { Timeline } from '../domain/timeline';
 
 /** The bar's time span, ROS seconds, and its width, CSS pixels. */
 export interface Axis extends Span {
@@ -40,10 +40,7 @@ export function stepped(
   return Math.max(Math.min(axis.from, from ?? axis.from), at);
 }
 
-/** Least column width, CSS pixels: narrower ones cannot be told apart. */
-const LEAST_COLUMN_PX = 3;
-
-/** Sum of the events within a few pixels. */
+/** The events within a few pixels. */
 export type Column = ReturnType<typeof columnsOf>[number];
 
 /**
@@ -53,40 +50,23 @@ const height = (count: number, most: number): number =>
   count === 0 ? 0 : Math.max(0.1, Math.sqrt(count / most));
 
 export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis) {
-  const bucketPx = (bucketS / (axis.to - axis.from)) * axis.width;
-  const together = Math.max(1, Math.ceil(LEAST_COLUMN_PX / Math.max(1e-9, bucketPx)));
-  const wide = together * bucketS;
-  const sums = new Map<number, Happened>();
-  for (const bucket of buckets) {
-    const place = Math.floor((bucket.start - axis.from) / wide + 1e-6);
-    sums.set(place, added(sums.get(place), bucket, axis.from + place * wide));
-  }
-  const all = [...sums.values()].filter(({ start }) => start < axis.to && start + wide > axis.from);
+  const all = buckets.filter(({ start }) => start < axis.to && start + bucketS > axis.from);
   const most = Math.max(1, ...all.map(({ scans, failures }) => Math.max(scans, failures)));
-  return all.map((sum) => {
-    const x = xOf(axis, sum.start);
+  return all.map((bucket) => {
+    const x = xOf(axis, bucket.start);
     // Not beyond the end of the bar, which is usually now.
-    const end = Math.min(sum.start + wide, axis.to);
+    const end = Math.min(bucket.start + bucketS, axis.to);
     return {
-      ...sum,
+      ...bucket,
       end,
       x,
       width: Math.max(1, xOf(axis, end) - x),
       // Shares of the tallest column, 0 to 1.
-      scanHeight: height(sum.scans, most),
-      failureHeight: height(sum.failures, most),
+      scanHeight: height(bucket.scans, most),
+      failureHeight: height(bucket.failures, most),
     };
   });
 }
-
-const added = (sum: Happened | undefined, bucket: Happened, start: number): Happened => ({
-  start,
-  scans: (sum?.scans ?? 0) + bucket.scans,
-  failures: (sum?.failures ?? 0) + bucket.failures,
-  looks: (sum?.looks ?? 0) + bucket.looks,
-  pests_seen: (sum?.pests_seen ?? 0) + bucket.pests_seen,
-  pests_cleared: (sum?.pests_cleared ?? 0) + bucket.pests_cleared,
-});
 
 /** Spans clipped to the bar, CSS pixels; at least one pixel wide. */
 export function stretchesOf(spans: readonly Span[], axis: Axis) {

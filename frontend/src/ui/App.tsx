@@ -1,6 +1,5 @@
 import { type CSSProperties, type JSX, useSyncExternalStore } from 'react';
 
-import type { CycleSetting } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
 import { useSelected } from '../store/create';
@@ -19,13 +18,7 @@ import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
 import { WithParts } from './loadDeferred';
 
-export function App({
-  kiosk,
-  cycle = NO_CYCLE,
-}: {
-  kiosk: boolean;
-  cycle?: CycleSetting;
-}): JSX.Element {
+export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
   const pane = useApp((state) => state.view.pane);
   const selected = useApp((state) => state.view.selected);
@@ -57,7 +50,7 @@ export function App({
         </a>
       )}
       <Header kiosk={kiosk}>
-        {kiosk && <WithParts>{(parts) => <parts.KioskNote cycle={cycle} />}</WithParts>}
+        {kiosk && <WithParts>{(parts) => <parts.KioskNote />}</WithParts>}
       </Header>
       <div className="banners">
         <FrozenBanner />
@@ -103,8 +96,6 @@ function onRoom(listener: () => void): () => void {
   roomy.addEventListener('change', listener);
   return () => roomy.removeEventListener('change', listener);
 }
-
-const NO_CYCLE: CycleSetting = { seconds: null, refused: null };
 
 /** Moves the focus in code, because the URL fragment belongs to the permalink. */
 function skipToTable(event: React.MouseEvent): void {

@@ -6,7 +6,7 @@ import { minuteText } from '../domain/format';
 import { byCause, isBad, isSilent, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
-import { addressOfPage, CYCLE_LIMITS, type CycleSetting } from '../store/cycle';
+import { addressOfPage } from '../store/cycle';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
@@ -133,23 +133,11 @@ function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): strin
   return verdict === 'healthy' ? S.attentionNone : null;
 }
 
-/** Most characters of a refused cycle setting that are quoted. */
-const LONGEST_SETTING = 12;
-
 /** In a wall screen's header: the time, and how to leave. */
-export function KioskNote({ cycle }: { cycle: CycleSetting }): JSX.Element {
+export function KioskNote(): JSX.Element {
   const time = useTicking(() => minuteText(timeOfDay()));
   return (
     <div className="kiosk-note" data-testid="kiosk-note">
-      {cycle.refused !== null && (
-        <span role="status">
-          {S.cycleRefused(
-            shown(cycle.refused, LONGEST_SETTING),
-            CYCLE_LIMITS.least,
-            CYCLE_LIMITS.most,
-          )}
-        </span>
-      )}
       <button type="button" className="text-button" onClick={closeKiosk}>
         {S.kioskLeave} <kbd>Esc</kbd>
       </button>

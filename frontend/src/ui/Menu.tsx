@@ -1,12 +1,12 @@
-import { useEffect, useState, type JSX, type ReactNode } from 'react';
+import type { JSX, ReactNode } from 'react';
 
 import { route } from '../contract/api';
-import { fetchSession, signOut } from '../contract/people';
-import type { Session } from '../contract/types';
+import { signOut } from '../contract/people';
 import { failureText } from '../domain/format';
 import type { TemperatureUnit } from '../domain/sensors';
 import { reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
 import { prefer, useApp } from '../store/app';
+import { person, useSelected } from '../store/create';
 import type { Settings } from '../store/settings';
 import { LANGUAGE, S } from '../strings';
 import { Segmented, useClose } from '../widgets/controls';
@@ -113,14 +113,7 @@ export function SignOut({
   close: () => void;
   leave?: (url: URL) => void;
 }): JSX.Element | null {
-  const [session, setSession] = useState<Session | null>(null);
-  useEffect(() => {
-    const abort = new AbortController();
-    fetchSession(abort.signal).then(setSession, () => {
-      // Without a session there is nothing to offer.
-    });
-    return () => abort.abort();
-  }, []);
+  const session = useSelected(person);
   if (!session?.can_sign_out) return null;
   const end = async (): Promise<void> => {
     close();

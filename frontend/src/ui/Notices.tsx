@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { rosText, secondsOf } from '../domain/time';
 import { shown } from '../domain/text';
 import type { Snapshot } from '../domain/twin';
-import { useApp, type AppState } from '../store/app';
+import { useApp, useContent, type AppState } from '../store/app';
 import { selectSensor } from '../store/derived';
 import { selectClockFault, selectIsDisconnected, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
@@ -107,12 +107,10 @@ function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): 
 
 /** The notice: in the middle of an empty map, or at the edge of one with content. */
 export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | null {
-  const id = useApp((state) => noticeFor(state)?.id);
-  const title = useApp((state) => noticeFor(state)?.title);
-  const hint = useApp((state) => noticeFor(state)?.hint);
-  const more = useApp((state) => noticeFor(state)?.more);
-  const large = useApp((state) => noticeFor(state)?.large ?? false);
-  if (!id || large !== (place === 'middle')) return null;
+  const notice = useContent(noticeFor);
+  const large = notice?.large ?? false;
+  if (!notice || large !== (place === 'middle')) return null;
+  const { id, title, hint, more } = notice;
   return (
     <div
       className={large ? 'notice notice-large' : 'notice'}
@@ -130,13 +128,12 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
 /** Replaces the rows of an empty table. */
 export function EmptyTable(): JSX.Element | null {
   const isEmpty = useApp((state) => selectTags(state).length === 0);
-  const title = useApp((state) => noticeFor(state)?.title);
-  const hint = useApp((state) => noticeFor(state)?.hint);
+  const notice = useContent(noticeFor);
   if (!isEmpty) return null;
   return (
     <div className="empty-table" data-testid="empty-table">
-      <strong>{title}</strong>
-      <p>{hint}</p>
+      <strong>{notice?.title}</strong>
+      <p>{notice?.hint}</p>
     </div>
   );
 }

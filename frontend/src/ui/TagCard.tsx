@@ -218,10 +218,8 @@ function CardReading({
 const PACE_MS = 500;
 
 /** Where the readings of a tag come from; null until loaded. A link may name a tag that the twin does not know. */
-function useSource(tagId: string, isKnown: boolean): string | null {
-  const { value } = useFetched<TagHistory>(
-    isKnown ? { key: tagId, group: tagId, run: (signal) => fetchHistory(tagId, signal) } : null,
+const useSource = (tagId: string, isKnown: boolean): string | null =>
+  useFetched<TagHistory>(
+    isKnown ? { key: tagId, run: (signal) => fetchHistory(tagId, signal) } : null,
     PACE_MS,
-  );
-  return value?.tag_id === tagId ? value.source : null;
-}
+  ).value?.source ?? null;

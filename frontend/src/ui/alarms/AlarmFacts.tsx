@@ -14,7 +14,7 @@ import { selectNow } from '../../alarms/latest';
 import type { Alarm, Verdict } from '../../contract/types';
 import { ageSeconds } from '../../domain/time';
 import { C } from '../../notes/NoteMarks';
-import { store, useApp } from '../../store/app';
+import { store, useApp, useContent } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectKnownSince } from '../../alarms/latest';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
@@ -39,9 +39,7 @@ interface ValuesNow extends Values {
 export function useValues(alarm: Alarm): ValuesNow {
   const last = useSelected(hourAgo);
   const sensors = useApp(selectCatalogue);
-  // As text: a new state with the same values for this tag does not re-render.
-  const key = useApp((state) => JSON.stringify(selectNow(state, alarm, last)));
-  const state = JSON.parse(key) as Now | null;
+  const state = useContent((shown) => selectNow(shown, alarm, last));
   const values = valuesOf(alarm, sensors, state);
   // As in the banner.
   const fault = useApp(selectClockFault);

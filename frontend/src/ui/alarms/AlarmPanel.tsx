@@ -14,7 +14,7 @@ import { selectNow, worstNowFirst } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
 import { saveCsv } from '../../export/save';
-import { store, useApp } from '../../store/app';
+import { store, useApp, useContent } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { selectCatalogue } from '../../store/derived';
 import { selectLatestTag } from '../../store/moment';
@@ -36,16 +36,8 @@ const isTag = (id: string): boolean => selectLatestTag(store.get(), id) !== unde
 /** The current alarms, beside the map: active, shelved and resolved. */
 export function AlarmPanel(): JSX.Element {
   const listed = useSelected(alarmList);
-  // As text: states that keep the order do not re-render.
-  const ids = useApp((state) =>
-    worstNowFirst(state, listed.active)
-      .map(({ alarm }) => alarm.id)
-      .join('\n'),
-  );
-  const all = useMemo(() => {
-    const items = new Map(listed.active.map((item) => [item.alarm.id, item]));
-    return { ...listed, active: ids.split('\n').flatMap((id) => items.get(id) ?? []) };
-  }, [listed, ids]);
+  const active = useContent((state) => worstNowFirst(state, listed.active));
+  const all = useMemo(() => ({ ...listed, active }), [listed, active]);
   const sensors = useApp(selectCatalogue);
   const [filter, setFilter] = useState('');
   const [order, setOrder] = useState<Order>('cause');
@@ -61,7 +53,7 @@ export function AlarmPanel(): JSX.Element {
   useChosenInSight(
     list,
     useApp((state) => state.view.selected),
-    ids,
+    active,
   );
   useTopAfter(list, filter);
   const hasAny = all.active.length + all.shelved.length > 0;

@@ -85,7 +85,7 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
   const oldest = oldestOf(items);
   const acknowledged = items.filter(
     ({ isAcknowledged, alarm: { acknowledged_by: by } }) =>
-      isAcknowledged && (who === null || mayWithdraw(who, by ?? who.name)),
+      isAcknowledged && (!who?.name || mayWithdraw(who, by ?? who.name)),
   );
   const shelved = items.filter(({ shelf }) => shelf !== null);
   const open = items.filter(({ alarm, shelf }) => shelf === null && alarm.cleared_at === null);

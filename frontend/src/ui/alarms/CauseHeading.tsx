@@ -7,7 +7,7 @@ import { groupOf, oldestOf, unacknowledged, type AlarmList, type Item } from '..
 import { partsText, whereText } from '../../alarms/words';
 import type { Alarm } from '../../contract/types';
 import { airOf } from '../../domain/health';
-import { useApp } from '../../store/app';
+import { useApp, useContent } from '../../store/app';
 import { selectCatalogue } from '../../store/derived';
 import { S } from '../../strings';
 import { Icon } from '../../widgets/controls';
@@ -45,9 +45,7 @@ export function CauseHeading({
   const by = first?.alarm.acknowledged_by;
   const isByOne = shown.every(({ alarm }) => alarm.acknowledged_by === by);
   const who = useWhoAcknowledged(isByOne && first ? first.alarm : null);
-  // As text, so that a new state with the same counts does not re-render.
-  const key = useApp((state) => JSON.stringify(countsNow(state, shown)));
-  const counts = JSON.parse(key) as ReturnType<typeof countsNow>;
+  const counts = useContent((state) => countsNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
   const parts = useApp((state) => partsText(shown, sensors, (alarm) => selectNow(state, alarm)));
   const [worst] = counts;

@@ -77,7 +77,7 @@ function endOf(alarm: Alarm): number | null {
 }
 
 function take(): void {
-  if (person.get() === null || pending > 0 || store.get().twin.alarms === null) return;
+  if (!person.get()?.name || pending > 0 || store.get().twin.alarms === null) return;
   own.set(merged(own.get(), alarmsNow(), endOf));
 }
 
@@ -144,7 +144,7 @@ export function startPeople(): () => void {
         paceMs: PACE_MS,
         parts: ({ twin }) => [twin.connection.epoch],
         onValue: (found) => {
-          person.set(found.name ? found : null);
+          person.set(found);
           acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
           take();
         },

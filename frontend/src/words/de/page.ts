@@ -142,8 +142,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Drucken',
   kiosk: 'Wandanzeige',
   kioskLeave: 'Beenden',
-  cycleRefused: (asked, least, most) =>
-    `cycle=${asked} wird ignoriert: möglich sind ${least} bis ${most} Sekunden.`,
   help: 'Tastenkürzel',
   signOut: 'Abmelden',
   signOutFailed: (reason) => `Abmelden fehlgeschlagen: ${reason}`,

@@ -145,8 +145,6 @@ export const PAGE = {
   print: 'Print',
   kiosk: 'Wall screen',
   kioskLeave: 'Exit',
-  cycleRefused: (asked: string, least: number, most: number): string =>
-    `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,
   help: 'Keyboard shortcuts',
   signOut: 'Sign out',
   signOutFailed: (reason: string): string => `You are still signed in: ${reason}`,

@@ -141,8 +141,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Imprimir',
   kiosk: 'Pantalla mural',
   kioskLeave: 'Salir',
-  cycleRefused: (asked, least, most) =>
-    `cycle=${asked} se ignora: use de ${least} a ${most} segundos.`,
   help: 'Atajos de teclado',
   signOut: 'Cerrar sesión',
   signOutFailed: (reason) => `La sesión sigue abierta: ${reason}`,

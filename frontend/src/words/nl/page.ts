@@ -142,8 +142,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   print: 'Afdrukken',
   kiosk: 'Wandscherm',
   kioskLeave: 'Verlaten',
-  cycleRefused: (asked, least, most) =>
-    `cycle=${asked} wordt genegeerd: mogelijk is ${least} tot ${most} seconden.`,
   help: 'Sneltoetsen',
   signOut: 'Afmelden',
   signOutFailed: (reason) => `U bent nog aangemeld: ${reason}`,

@@ -227,11 +227,10 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
     expect(hmi.card("a")).to_be_in_viewport()
     expect(hmi.map).to_be_hidden()
     expect(slider(hmi)).to_be_in_viewport(ratio=1)
-    # On its side, the bar is beside the map, and the menu scrolls to its end.
+    # On its side, the bar is beside the map, and all of the menu in sight.
     hmi.turn(f"at={hour.begun_s + 700}")
-    hmi.resize(844, 390)
+    hmi.resize(740, 360)
     expect(slider(hmi)).to_be_in_viewport(ratio=1)
     buttons.first.click()
-    last = hmi.page.locator(".menu-list > *").last
-    last.scroll_into_view_if_needed()
-    expect(last).to_be_in_viewport(ratio=1)
+    for entry in hmi.page.locator(".menu-list > *").all():
+        expect(entry).to_be_in_viewport(ratio=1)

@@ -89,6 +89,10 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
         return details.top < end.bottom and end.top < details.bottom
 
     phone.expect(are_on_one_line, "one line")
+    # On its side, the first task has its limit.
+    phone.resize(740, 360)
+    why = phone.test_id("health-first")
+    phone.expect(lambda: why.evaluate("e => e.scrollWidth <= e.clientWidth"), "all of its words")
 
 
 def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:

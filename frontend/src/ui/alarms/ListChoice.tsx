@@ -91,7 +91,7 @@ export function AlarmsLabel(): JSX.Element {
     <>
       {worst && <HealthShape verdict={worst} />}
       <span>
-        {S.alarms}{' '}
+        {S.alarms + (hasAny ? ' ' : '')}
         {hasAny && (
           <span data-testid="alarm-count" aria-hidden="true">
             ({isNow ? count : S.alarmsNow(count)})

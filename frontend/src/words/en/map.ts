@@ -49,7 +49,7 @@ export const MAP = {
   legendOld: 'Faint and hatched: readings too old',
   readoutOld: 'readings too old',
   heat: 'Heat map shows',
-  heats: { nearest: 'Nearest readings', estimate: 'Estimate', error: 'Uncertainty' },
+  heats: { nearest: 'Readings', estimate: 'Estimate', error: 'Uncertainty' },
   partMissing: 'This part of the page could not be loaded. Reload the page.',
   colouring: 'Colour by',
   colourings: { ideal: 'Ideal', value: 'Value' },

@@ -11,7 +11,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
-from lupin_twin.core.drops import Counts, Reason, Recent
+from lupin_twin.core.drops import Counts, Reason, Recent, cut
 from lupin_twin.core.state import ClockState
 
 # Longer texts are cut: a source's name, for example, may have any length.
@@ -245,7 +245,7 @@ def _inputs(health: Health) -> Finding:
 
 def shown(text: str) -> str:
     """The text, cut to `MAX_SHOWN` characters."""
-    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
+    return cut(text, MAX_SHOWN)
 
 
 # --- reading the report ---------------------------------------------------------------------

@@ -14,7 +14,7 @@ from datetime import datetime, tzinfo
 from decimal import Decimal
 from typing import Any, Final
 
-from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH, Rejected
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH, Rejected, cut
 
 
 class ConfigError(ValueError):
@@ -116,7 +116,7 @@ def shown(value: Any) -> str:
         text = _SHORT.repr(value)
     except ValueError:  # an integer of thousands of digits
         text = f"a very large {type(value).__name__}"
-    return text if len(text) <= 80 else f"{text[:79]}…"
+    return cut(text, 80)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
-from lupin_twin.core.drops import Counts, Reason, Recent
+from lupin_twin.core.drops import Counts, Reason, Recent, cut
 from lupin_twin.core.state import ClockState
 
 # Longer texts are cut: a source's name, for example, may have any length.
@@ -25,7 +25,7 @@ _REASONS: Final = tuple(reason.value for reason in Reason)
 _RECENTLY: Final = "recently: "
 _LAST: Final = "last: "
 _ERRORS: Final = "callback errors"
-_MAX_DIGITS: Final = 15
+_MAX_COUNT: Final = 10**15
 _PROBLEM: Final = "problem "
 # At most this many input problems are reported: a broken network may have any number.
 MAX_PROBLEMS: Final = 8
@@ -245,7 +245,7 @@ def _inputs(health: Health) -> Finding:
 
 def shown(text: str) -> str:
     """The text, cut to `MAX_SHOWN` characters."""
-    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
+    return cut(text, MAX_SHOWN)
 
 
 # --- reading the report ---------------------------------------------------------------------
@@ -299,7 +299,7 @@ def _journal(finding: Finding) -> Condition:
     if state is None:
         return UNKNOWN_JOURNAL
     simulated = _read_stretches(values.get("simulated", ""))
-    complete = values.get("complete to", "")
+    complete = _numbers(values.get("complete to", ""))
     own = shown(values.get("id", ""))
     return Condition(
         state,
@@ -311,7 +311,7 @@ def _journal(finding: Finding) -> Condition:
         refused=_number(values, "refused"),
         quarantined=shown(values.get("set aside", "")),
         simulated_ns=simulated[0] if len(simulated) == 1 else None,
-        complete_ns=int(complete) if _are_stamps(complete) else None,
+        complete_ns=complete[0] if len(complete) == 1 else None,
         kept_ns=_read_stretches(values.get("kept", "")),
         # A copy's file is named by it, so it must not be a path.
         journal_id=own if own.isascii() and own.isalnum() else "",
@@ -322,21 +322,19 @@ def _stretches(stretches: Iterable[tuple[int, int]]) -> str:
     return " ".join(str(stamp_ns) for stretch in stretches for stamp_ns in stretch)
 
 
-def _read_stretches(text: str) -> tuple[tuple[int, int], ...]:
-    """Parse pairs of stamps; empty if the text is anything else."""
+def _numbers(text: str) -> list[int]:
+    """Parse numbers or stamps of ROS time, ns; empty if the text is anything else."""
     words = text.split(" ") if len(text) <= MAX_SHOWN * 2 else []
-    if len(words) % 2 or not _are_stamps(*words):
-        return ()
-    stamps = [int(word) for word in words]
-    return tuple(zip(stamps[::2], stamps[1::2], strict=True))
+    # No stamp has more digits. isascii(): isdigit() also accepts characters that int() refuses.
+    are_numbers = all(word.isascii() and word.isdigit() and len(word) <= 19 for word in words)
+    return [int(word) for word in words] if are_numbers else []
 
 
-def _are_stamps(*texts: str) -> bool:
-    # As in `_number`. No stamp has more digits.
-    return all(text.isascii() and text.isdigit() and len(text) <= 19 for text in texts)
+def _read_stretches(text: str) -> tuple[tuple[int, int], ...]:
+    stamps = _numbers(text)
+    return () if len(stamps) % 2 else tuple(zip(stamps[::2], stamps[1::2], strict=True))
 
 
 def _number(values: Mapping[str, str], key: str) -> int:
-    text = values.get(key, "")
-    # No count has more digits. isascii(): isdigit() also accepts characters that int() refuses.
-    return int(text) if text.isascii() and text.isdigit() and len(text) <= _MAX_DIGITS else 0
+    found = _numbers(values.get(key, ""))
+    return found[0] if len(found) == 1 and found[0] < _MAX_COUNT else 0

@@ -42,6 +42,11 @@ def too_long(what: str, text: str) -> str:
     return f"{what} {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
 
 
+def cut(text: str, most: int = MAX_TEXT_LENGTH) -> str:
+    """The text, cut to a number of characters; its end shows that there was more."""
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
 def valid_text(text: str) -> str:
     """The text without lone surrogates, which JSON may hold, but neither SQLite nor an answer."""
     return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")

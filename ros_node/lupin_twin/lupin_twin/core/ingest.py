@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected
+from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected, cut
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import (
     STATUS_OK,
@@ -70,16 +70,12 @@ def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspec
         sent,
         stamp_ns=observed_at(own_stamp_ns, now_ns),
         pose=scanned_pose(sent.pose) if succeeded and sent.pose else None,
-        status_detail=_cut(sent.status_detail),
-        source=_cut(sent.source),
+        # Cut to what can be stored, so that nothing is dropped because of a text.
+        status_detail=cut(sent.status_detail),
+        source=cut(sent.source),
         own_stamp_ns=own_stamp_ns,
         mission=sent.mission[:MAX_TEXT_LENGTH],
     )
-
-
-def _cut(text: str) -> str:
-    """Cut a producer's text to what can be stored, so that nothing is dropped because of it."""
-    return text if len(text) <= MAX_TEXT_LENGTH else f"{text[: MAX_TEXT_LENGTH - 1]}…"
 
 
 def discoveries(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.drops import cut
 
 # Largest allowed `max_pose_m`: a pose beyond it is far off in any greenhouse.
 FARTHEST_M: Final = 1_000_000.0
@@ -21,7 +22,7 @@ MAX_NAMES: Final = 16
 DAY_S: Final = 86_400.0
 # A century.
 MAX_JOURNAL_DAYS: Final = 36_500.0
-# Characters of a value that an error message repeats.
+# Characters of a value that an error message repeats to the client that set it.
 MAX_SHOWN: Final = 80
 
 
@@ -163,7 +164,7 @@ def _checked(name: str, value: object, default: object, described: Described) ->
         value = float(value)  # YAML and the command line read 2 as an integer
     if type(value) is not expected:
         raise ParameterError(
-            f"parameter {name} is {_shown(value)} ({type(value).__name__}), "
+            f"parameter {name} is {cut(repr(value), MAX_SHOWN)} ({type(value).__name__}), "
             f"expected {expected.__name__}"
         )
     if isinstance(value, str) and not value and not described.may_be_empty:
@@ -178,19 +179,15 @@ def _names(name: str, value: object) -> tuple[str, ...]:
     if value is None or isinstance(value, str):
         value = [value or ""]
     if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
-        raise ParameterError(f"parameter {name} is {_shown(value)}, expected a list of names")
+        raise ParameterError(
+            f"parameter {name} is {cut(repr(value), MAX_SHOWN)}, expected a list of names"
+        )
     names = tuple(filter(None, value))
     if len(names) > MAX_NAMES:
         raise ParameterError(
             f"parameter {name} is {len(names)} names, expected {MAX_NAMES} at most"
         )
     return names
-
-
-def _shown(value: object) -> str:
-    """The value, cut if it is long: the error message is returned to the client that set it."""
-    text = repr(value)
-    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
 
 def describe(name: str) -> Described:
@@ -209,8 +206,8 @@ def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters
     for name, value in wanted.items():
         if why := describe(name).fixed:
             raise ParameterError(
-                f"parameter {name} is {getattr(now, name)!r} and cannot become {_shown(value)} "
-                f"while the twin runs: {why}"
+                f"parameter {name} is {getattr(now, name)!r} and cannot become "
+                f"{cut(repr(value), MAX_SHOWN)} while the twin runs: {why}"
             )
     return replace(now, **wanted)  # type: ignore[arg-type]  # checked there
 

@@ -144,7 +144,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
     implausible: (reading) => `${reading}: valor inverosímil`,
     scanFailed: (outcome, age) =>
-      `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
+      `Medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
     pest: (count) =>
       count > 0
         ? `Plaga detectada: ${counted(count, 'individuo', 'individuos')}`

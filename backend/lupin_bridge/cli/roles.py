@@ -315,11 +315,10 @@ def _source_of(
     feed: Feed | None,
     limits: Limits,
 ) -> TwinSource:
-    from lupin_bridge.feed.local import LocalTwin  # noqa: PLC0415  # a fleet has no ROS
-    from lupin_bridge.feed.web import WebTwin  # noqa: PLC0415
-
     timeout_s = limits.answer_timeout_s
     if role == "web":
+        from lupin_bridge.feed.web import WebTwin  # noqa: PLC0415  # a fleet has no ROS
+
         return WebTwin(
             ros_args=ros_args,
             timeout_s=timeout_s,
@@ -327,6 +326,8 @@ def _source_of(
             rejoin_after_s=limits.rejoin_after_s,
             journal=Path(settings.journal).absolute() if settings.journal else None,
         )
+    from lupin_bridge.feed.local import LocalTwin  # noqa: PLC0415  # as above
+
     # The feed's arguments are for the twin alone: its feeder has no journal.
     own_args = [] if feed is None else feed.twin_args
     origin: Origin = "robot" if feed is None else feed.origin

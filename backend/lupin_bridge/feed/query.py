@@ -39,6 +39,7 @@ from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import latest
 from lupin_twin.journal.writes import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.process import return_large_blocks
 from lupin_twin.runtime.workers import ShouldStop, Workers
 
 if TYPE_CHECKING:
@@ -230,6 +231,7 @@ def main(answerer: Callable[[], Answerer] = FromJournal) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     os.nice(NICENESS)
+    return_large_blocks()
     gc.freeze()
     # Standard output carries answers only: what is printed goes to standard error.
     with os.fdopen(os.dup(1), "wb") as answers:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 import orjson
 
@@ -20,7 +20,7 @@ from lupin_bridge.judge.quantities import DAILY, Sensor, Sensors
 from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s, with_daily
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream import pollers
+from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.past import MAX_POINTS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TagState, samples_of
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast, moment_of
@@ -47,6 +47,7 @@ from lupin_twin.runtime.estimates import (
     ReportRequest,
     estimate_at,
     report_of,
+    sensors_of,
 )
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -287,6 +288,49 @@ def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list
 # --- reports on estimates ------------------------------------------------------------------------
 
 
+def quality(reports: Mapping[str, Report]) -> bytes:
+    """`pollers.EstimateQualities`."""
+    return orjson.dumps({"sensors": {name: _quality(one) for name, one in reports.items()}})
+
+
+def tags(reports: Mapping[str, Report]) -> bytes:
+    """`pollers.ExpectedTags` of the one report."""
+    [(sensor_type, report)] = reports.items()
+    found = {
+        tag.tag_id: {
+            "measured": tag.measured,
+            "observed_at": stamp(tag.observed_at_ns),
+            "expected": tag.expected,
+            "expected_sd": tag.expected_sd,
+            "z": tag.z,
+            "offset": tag.offset,
+            "left_out": tag.changed_since_ns is not None,
+        }
+        for tag in report.tags
+    }
+    return orjson.dumps({"sensor_type": sensor_type, "at": stamp(report.at_ns), "tags": found})
+
+
+def advice(reports: Mapping[str, Report]) -> bytes:
+    """`pollers.Advice` of the one report."""
+    [(sensor_type, report)] = reports.items()
+    return orjson.dumps({"sensor_type": sensor_type, "places": report.places})
+
+
+def _quality(report: Report) -> dict[str, Any]:
+    record = report.record
+    return {
+        "fitted_at": moment(report.at_ns if report.is_fitted else None),
+        "fit_problem": report.fit_problem,
+        "graded_since": moment(record.since_ns),
+        "day": record.day,
+        "week": record.week,
+        "share_day": record.day.share,
+        "share_week": record.week.share,
+        "is_trusted": record.is_trusted,
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Reports:
     """The report on a sensor's estimates (None: on those of every sensor), as of a moment.
@@ -302,7 +346,7 @@ class Reports:
     now_ns: int
     day_length_s: float
     sensors: Sensors = field(compare=False)
-    write_json: Callable[[Mapping[str, Report]], bytes] = pollers.quality
+    write_json: Callable[[Mapping[str, Report]], bytes] = quality
     max_places: int | None = None
     occupancy: OccupancyMap | None = field(default=None, compare=False)
 
@@ -333,7 +377,7 @@ class Reports:
     def _look_up(self, log: LogReader) -> list[_OfSensor]:
         up_to_ns, day_s = self.now_ns if self.at_ns is None else self.at_ns, self.day_length_s
         snapshot, found = log.state(up_to_ns), []
-        for name in [self.sensor_type] if self.sensor_type else pollers.sensors_of(snapshot):
+        for name in [self.sensor_type] if self.sensor_type else sensors_of(snapshot):
             pasts = log.readings(name, up_to_ns, day_s, REPORT_DAYS)
             at_ns = moment_of(pasts, up_to_ns, day_s) if self.at_ns is None else self.at_ns
             plausible_pasts = _that_count(pasts, 0, self.sensors.named(name))

@@ -17,6 +17,7 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
+from lupin_bridge.past import fields
 from lupin_bridge.past.fields import Estimated, Field, Reports
 from lupin_bridge.past.plans import PLAN_TAG_S
 from lupin_bridge.query_string import AT, Name, needed, parameter, parameters_of, read
@@ -276,7 +277,7 @@ async def quality(request: Request) -> Response:
     up to the last whole hour.
     """
     query = read(QualityQuery, request.query_params.multi_items())
-    return await _reports(request, query.sensor_type, query.at, pollers.quality)
+    return await _reports(request, query.sensor_type, query.at, fields.quality)
 
 
 @read_route(
@@ -289,7 +290,7 @@ async def quality(request: Request) -> Response:
 async def tags(request: Request) -> Response:
     """Predicted from all other tags, and from the tag's own readings except the latest ones."""
     query = read(TagsQuery, request.query_params.multi_items())
-    return await _reports(request, query.sensor_type, query.at, pollers.tags)
+    return await _reports(request, query.sensor_type, query.at, fields.tags)
 
 
 @read_route(
@@ -305,7 +306,7 @@ async def advice(request: Request) -> Response:
     Without a map, and with `at`, they are around the tags: the log does not have past maps.
     """
     query = read(AdviceQuery, request.query_params.multi_items())
-    return await _reports(request, query.sensor_type, query.at, pollers.advice, query.places)
+    return await _reports(request, query.sensor_type, query.at, fields.advice, query.places)
 
 
 async def _reports(

@@ -1,6 +1,6 @@
 """Polls the log for the quality of estimates, and the twin for what the robot reports of itself.
 
-Has the types of both for the web contract (see `schema`), their JSON, and the polling loops.
+Has the types of both for the web contract (see `schema`), and the polling loops.
 
 No state frame waits for this: the judge gets a result when it has come.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Final
@@ -22,7 +21,7 @@ from lupin_bridge.feed.tasks import Periodic
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import Hub
 from lupin_bridge.stream.schema import Contract, Time
-from lupin_bridge.stream.state_json import moment, stamp
+from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRefused
@@ -119,52 +118,6 @@ class Advice(Contract):
     places: list[AdvisedPlace]
 
 
-# --- as JSON text --------------------------------------------------------------------------------
-
-
-def quality(reports: Mapping[str, Report]) -> bytes:
-    """`EstimateQualities`."""
-    return orjson.dumps({"sensors": {name: _quality(one) for name, one in reports.items()}})
-
-
-def tags(reports: Mapping[str, Report]) -> bytes:
-    """`ExpectedTags` of the one report."""
-    [(sensor_type, report)] = reports.items()
-    found = {
-        tag.tag_id: {
-            "measured": tag.measured,
-            "observed_at": stamp(tag.observed_at_ns),
-            "expected": tag.expected,
-            "expected_sd": tag.expected_sd,
-            "z": tag.z,
-            "offset": tag.offset,
-            "left_out": tag.changed_since_ns is not None,
-        }
-        for tag in report.tags
-    }
-    return orjson.dumps({"sensor_type": sensor_type, "at": stamp(report.at_ns), "tags": found})
-
-
-def advice(reports: Mapping[str, Report]) -> bytes:
-    """`Advice` of the one report."""
-    [(sensor_type, report)] = reports.items()
-    return orjson.dumps({"sensor_type": sensor_type, "places": report.places})
-
-
-def _quality(report: Report) -> dict[str, Any]:
-    record = report.record
-    return {
-        "fitted_at": moment(report.at_ns if report.is_fitted else None),
-        "fit_problem": report.fit_problem,
-        "graded_since": moment(record.since_ns),
-        "day": record.day,
-        "week": record.week,
-        "share_day": record.day.share,
-        "share_week": record.week.share,
-        "is_trusted": record.is_trusted,
-    }
-
-
 # --- every sensor's report, every few seconds -----------------------------------------------------
 
 log = logging.getLogger(__name__)
@@ -172,9 +125,6 @@ log = logging.getLogger(__name__)
 PERIOD_S: Final = 15.0
 # The reports of all sensors take at most a tenth of a core: a pause is that many times as long.
 REST_FACTOR: Final = 9.0
-# A greenhouse has a handful of sensors; past this limit, the alphabetically first ones are taken.
-MAX_SENSORS: Final = 32
-
 # By tag and sensor: the time of the reading since which the sensor has changed, ns of ROS time.
 Changed = Mapping[str, Mapping[str, int]]
 
@@ -209,7 +159,7 @@ class EstimatePoller(Periodic):
         if snapshot is None:
             return
         known: dict[str, Report] = {}
-        for name in sensors_of(snapshot):
+        for name in estimates.sensors_of(snapshot):
             try:
                 known[name] = await self._report_on(name, snapshot)
             except (FieldRefused, NotRemembered, PastRefused, TwinUnavailableError) as error:
@@ -218,18 +168,6 @@ class EstimatePoller(Periodic):
                     known[name] = self.known[name]
         self.known = known
         self._on_changed(changed_of(known))
-
-
-def sensors_of(snapshot: Snapshot) -> list[str]:
-    """The sensors that can be estimated, at most `MAX_SENSORS`; 2 ms for 10,000 tags."""
-    names = {
-        reading.name
-        for tag in snapshot.tags
-        if tag.pose is not None
-        for reading in tag.readings
-        if reading.name and math.isfinite(reading.value)
-    }
-    return sorted(names)[:MAX_SENSORS]
 
 
 def changed_of(known: Mapping[str, Report]) -> Changed:

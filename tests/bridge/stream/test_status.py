@@ -12,6 +12,7 @@ from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge
 from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.past.fields import quality
 from lupin_bridge.stream import pollers, schema
 from lupin_bridge.stream.frames import (
     MAX_IN_FRAME,
@@ -22,12 +23,10 @@ from lupin_bridge.stream.frames import (
     alarms_in_frame,
 )
 from lupin_bridge.stream.pollers import (
-    MAX_SENSORS,
     Changed,
     EstimatePoller,
     EstimateQualities,
     changed_of,
-    sensors_of,
 )
 from lupin_bridge.stream.state_json import alarms_body, judgement
 from lupin_twin.core.diagnostics import Condition, JournalState
@@ -38,7 +37,7 @@ from lupin_twin.core.state import ClockState, Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.ros.convert import map_of
-from lupin_twin.runtime.estimates import Report, TagCheck
+from lupin_twin.runtime.estimates import MAX_SENSORS, Report, TagCheck, sensors_of
 from tests.support.messages import occupancy_grid
 from tests.support.seen import BY_LIGHT, NOW_NS, S, alarm, tag
 from tests.support.waiting import until
@@ -219,7 +218,7 @@ def test_a_value_held_only_by_the_deadband_has_its_limit_and_what_clears_it() ->
 
 def test_the_hit_rate_of_estimates() -> None:
     report = Report(5 * S, True, "why", Record(3 * S + 7, Tally(10, 9), Tally(70, 30)))
-    body = json.loads(pollers.quality({"co2": report, "ph": Report(S)}))
+    body = json.loads(quality({"co2": report, "ph": Report(S)}))
     EstimateQualities.model_validate(body)
     assert body["sensors"]["co2"] == {
         "fitted_at": {"sec": 5, "nanosec": 0},

@@ -130,7 +130,10 @@ export function edgesOf({ width, height, originX, originY, resolution, values }:
   const lines: number[] = [];
   for (let y = -1; y < height; y++) {
     for (let x = -1; x < width; x++) {
-      const corners = [isKnown(x, y), isKnown(x + 1, y), isKnown(x + 1, y + 1), isKnown(x, y + 1)];
+      const first = isKnown(x, y);
+      const [second, third, fourth] = [isKnown(x + 1, y), isKnown(x + 1, y + 1), isKnown(x, y + 1)];
+      if (first === second && second === third && third === fourth) continue;
+      const corners = [first, second, third, fourth];
       SIDES.forEach(([right, up], side) => {
         if (corners[side] === corners[(side + 1) % 4]) return;
         lines.push(originX + (x + 0.5 + right) * resolution, originY + (y + 0.5 + up) * resolution);

@@ -199,7 +199,7 @@ function selectOld(state: AppState, field: Field): Uint8Array | null {
 }
 
 const onMap = memoOne((field: Field) =>
-  memoLast((map: MapPicture | null) => finer(map ? onExplored(field, map) : field)),
+  memoLast((map: MapPicture | null) => (map ? onExplored(finer(field), map) : finer(field))),
 );
 
 /** The field of the shown moment, as far as the greenhouse is explored. */

@@ -142,7 +142,7 @@ export function drawAbove(frame: Frame): void {
 }
 
 /** Height of a limit's name right of the plot; CSS pixels. */
-const NAME_HEIGHT = 13;
+const NAME_HEIGHT = 15;
 const NAME_GAP = 6;
 
 /** Each limit's name at its line, with an arrow if the line lies above or below the picture. */

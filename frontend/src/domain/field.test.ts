@@ -11,6 +11,7 @@ import {
   estimatedField,
   fieldCorners,
   fieldPixels,
+  finer,
   NOT_KNOWN_STEP,
   onExplored,
   resolutionFor,
@@ -78,23 +79,68 @@ test('the grid reaches from its origin over all of its cells', () => {
 const outlined = (rows: readonly (readonly number[])[]): Field =>
   fieldWith(rows, { originX: 10, originY: 20, resolution: 0.5 });
 
-test('runs around what is known, each straight side once', () => {
-  expect(edgesOf(outlined([[NaN, 1, 1]]))).toEqual([
-    ...[10.5, 20, 11.5, 20],
-    ...[10.5, 20.5, 11.5, 20.5],
-    ...[10.5, 20, 10.5, 20.5],
-    ...[11.5, 20, 11.5, 20.5],
+test('the outline cuts corners, also around a hole; what is not known at all has none', () => {
+  expect(edgesOf(outlined([[NaN, 1]]))).toEqual([
+    ...[10.75, 20, 10.5, 20.25],
+    ...[11, 20.25, 10.75, 20],
+    ...[10.5, 20.25, 10.75, 20.5],
+    ...[11, 20.25, 10.75, 20.5],
   ]);
-});
-
-test('a hole has an edge too, and what is not known at all has none', () => {
   const ring = [
     [1, 1, 1],
     [1, NaN, 1],
     [1, 1, 1],
   ];
-  expect(edgesOf(outlined(ring))).toHaveLength(4 * 8);
+  expect(edgesOf(outlined(ring))).toHaveLength(4 * (4 + 12));
   expect(edgesOf(outlined([[NaN, NaN]]))).toEqual([]);
+});
+
+describe('finer cells', () => {
+  const [own, third] = [4, 1 / 3];
+  /** The parts of a cell, the lowest row first, of a grid that is three cells wide. */
+  const partsOf = (values: Float32Array, x: number, y: number): number[] =>
+    [0, 1, 2].flatMap((row) => [...values.slice((y * 3 + row) * 9 + x * 3).slice(0, 3)]);
+
+  test('are interpolated, with each cell’s own value at its centre', () => {
+    const fine = finer(
+      field([
+        [0, 3, 6],
+        [0, 3, 6],
+      ]),
+    );
+    expect([fine.width, fine.height, fine.resolution]).toEqual([9, 6, 0.5 * third]);
+    expect([...fine.values.slice(0, 9)].map(Math.round)).toEqual([0, 0, 1, 2, 3, 4, 5, 6, 6]);
+  });
+
+  test('never show a value at the centre of an unknown cell, and always at that of a known one', () => {
+    const rows = [
+      [1, 1, 1],
+      [1, NaN, 1],
+      [1, 1, 1],
+    ];
+    const hole = finer(field(rows)).values;
+    expect(partsOf(hole, 1, 1)[own]).toBeNaN();
+    expect(partsOf(hole, 0, 1)).not.toContain(NaN);
+    const alone = finer(field(rows.map((row) => row.map((value) => (value === 1 ? NaN : 1)))));
+    expect(partsOf(alone.values, 1, 1)[own]).toBe(1);
+    expect(partsOf(alone.values, 0, 1)).toEqual(Array(9).fill(NaN));
+  });
+
+  test('round the corners of what is known, also of an estimate’s error', () => {
+    const rows = [
+      [1, 1, NaN],
+      [1, 1, NaN],
+      [NaN, NaN, NaN],
+    ];
+    const given = { ...field(rows), sureness: sureness(rows.flat()) };
+    const { values, sureness: fine } = finer(given);
+    expect(
+      partsOf(values, 1, 1)
+        .map((value) => Number.isNaN(value))
+        .slice(4),
+    ).toEqual([false, true, true, true, true]);
+    expect(fine?.sd).toEqual(values);
+  });
 });
 
 describe('how sure a cell is', () => {

@@ -36,7 +36,8 @@ export function fieldPixels({ width, height, values }: Field, shade: Shade) {
     if (Number.isNaN(value)) return;
     const { rgb, alpha } = shade(value, cell);
     const at = ((height - 1 - Math.floor(cell / width)) * width + (cell % width)) * 4;
-    data.set([...rgb, 255 * alpha], at);
+    data.set(rgb, at);
+    data[at + 3] = 255 * alpha;
   });
   return { width, height, data };
 }
@@ -49,41 +50,95 @@ export function fieldCorners(field: Field): readonly [MapPoint, MapPoint] {
   ];
 }
 
-/** Outline of the known area: lines as successive x0, y0, x1, y1, metres in the map frame. */
+/** Each cell is drawn as this many by this many; odd, so that one of them has the cell's own value. */
+const FINER = 3;
+/** Weights of the cell before, the cell itself and the one after, for each part of the cell. */
+type Weights = readonly (readonly [number, number, number])[];
+const LINEAR: Weights = [
+  [1 / 3, 2 / 3, 0],
+  [0, 1, 0],
+  [0, 2 / 3, 1 / 3],
+];
+const BLUR: Weights = [[1 / 4, 1 / 2, 1 / 4]];
+
+/** Weighted sums along both axes. Beyond the grid its outermost cells go on. */
+function summed(cells: Float32Array, width: number, height: number, weights: Weights) {
+  const along = (rows: Float32Array, length: number): Float32Array => {
+    const columns = new Float32Array(rows.length * weights.length);
+    const count = rows.length / length;
+    weights.forEach(([before, own, after], part) => {
+      for (let cell = 0; cell < rows.length; cell++) {
+        const x = cell % length;
+        columns[(x * weights.length + part) * count + (cell - x) / length] =
+          before * (rows[x > 0 ? cell - 1 : cell] ?? 0) +
+          own * (rows[cell] ?? 0) +
+          after * (rows[x < length - 1 ? cell + 1 : cell] ?? 0);
+      }
+    });
+    return columns;
+  };
+  return along(along(cells, width), height);
+}
+
+function refined(values: Float32Array, width: number, height: number): Float32Array {
+  const known = values.map((value) => Number(!Number.isNaN(value)));
+  const blurred = summed(summed(known, width, height, BLUR), width, height, BLUR);
+  // The centre of a cell stays what it is.
+  const inside = blurred.map((share, cell) =>
+    known[cell] ? Math.max(0.5, share) : Math.min(0.49, share),
+  );
+  const share = summed(inside, width, height, LINEAR);
+  const weight = summed(known, width, height, LINEAR);
+  const sum = summed(
+    values.map((value) => (Number.isNaN(value) ? 0 : value)),
+    ...([width, height, LINEAR] as const),
+  );
+  return sum.map((value, cell) => ((share[cell] ?? 0) < 0.5 ? NaN : value / (weight[cell] ?? 1)));
+}
+
+/**
+ * The field in finer cells, without the steps of its own: values are interpolated between known cells, and
+ * the edge of what is known is rounded. The centre of an unknown cell stays unknown.
+ */
+export function finer(field: Field): Field {
+  const { width, height, sureness } = field;
+  return {
+    ...field,
+    width: width * FINER,
+    height: height * FINER,
+    resolution: field.resolution / FINER,
+    values: refined(field.values, width, height),
+    ...(sureness && { sureness: { ...sureness, sd: refined(sureness.sd, width, height) } }),
+  };
+}
+
+/** Middles of the sides of a square between the centres of four cells, from the first centre. */
+const SIDES = [
+  [0.5, 0],
+  [1, 0.5],
+  [0.5, 1],
+  [0, 0.5],
+] as const;
+
+/**
+ * Outline of the known area: lines as successive x0, y0, x1, y1, metres in the map frame. It cuts the
+ * corners of cells (marching squares).
+ */
 export function edgesOf({ width, height, originX, originY, resolution, values }: Field): number[] {
   const isKnown = (x: number, y: number): boolean =>
     x >= 0 && x < width && y >= 0 && y < height && !Number.isNaN(values[y * width + x]);
   const lines: number[] = [];
-  // Adjacent cell sides on one straight line are merged.
-  const runs = (
-    count: number,
-    isEdge: (index: number) => boolean,
-    corner: (index: number) => readonly [x: number, y: number],
-  ): void => {
-    let from = -1;
-    for (let index = 0; index <= count; index++) {
-      const is = index < count && isEdge(index);
-      if (is && from < 0) from = index;
-      if (is || from < 0) continue;
-      for (const [x, y] of [corner(from), corner(index)]) {
-        lines.push(originX + x * resolution, originY + y * resolution);
-      }
-      from = -1;
+  for (let y = -1; y < height; y++) {
+    for (let x = -1; x < width; x++) {
+      const first = isKnown(x, y);
+      const [second, third, fourth] = [isKnown(x + 1, y), isKnown(x + 1, y + 1), isKnown(x, y + 1)];
+      if (first === second && second === third && third === fourth) continue;
+      const corners = [first, second, third, fourth];
+      SIDES.forEach(([right, up], side) => {
+        if (corners[side] === corners[(side + 1) % 4]) return;
+        lines.push(originX + (x + 0.5 + right) * resolution, originY + (y + 0.5 + up) * resolution);
+      });
     }
-  };
-  for (let y = 0; y <= height; y++) {
-    runs(
-      width,
-      (x) => isKnown(x, y - 1) !== isKnown(x, y),
-      (x) => [x, y],
-    );
-  }
-  for (let x = 0; x <= width; x++) {
-    runs(
-      height,
-      (y) => isKnown(x - 1, y) !== isKnown(x, y),
-      (y) => [x, y],
-    );
   }
   return lines;
 }

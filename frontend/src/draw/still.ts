@@ -67,9 +67,9 @@ interface Placed {
   readonly placement: Placement;
 }
 
-/** Cells stay sharp unless they are smaller than pixels. */
-export function drawPicture(pen: Pen, picture: Placed): void {
-  place(pen, picture, pen.view.scale * picture.placement.resolution * pen.ratio < 1);
+/** Unless `isSmooth`, cells stay sharp if they are larger than pixels. */
+export function drawPicture(pen: Pen, picture: Placed, isSmooth = false): void {
+  place(pen, picture, isSmooth || pen.view.scale * picture.placement.resolution * pen.ratio < 1);
 }
 
 function place({ context, view }: Pen, { picture, placement }: Placed, isSmooth = false): void {

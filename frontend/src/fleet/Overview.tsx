@@ -12,6 +12,7 @@ import {
   useState,
 } from 'react';
 
+import { timeOfDay } from '../clock';
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import type { CauseText } from './Causes';
@@ -284,6 +285,11 @@ const SiteCard = memo(function SiteCard({
             <span className="fleet-silent">{silentText(site, asOf)}</span>
           )}
           {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
+          {isLive && isAhead(site) && (
+            <span className="fleet-line">
+              {S.clockTodo.clock_doubted} {S.offlineWhy.clock_ahead}
+            </span>
+          )}
           {!isLive && last !== null && last !== 'unknown' && (
             <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
           )}
@@ -322,6 +328,13 @@ function silentText(site: Site, asOf: number | null): string {
   const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
   return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }
+
+/** As in the fleet's judge, ms. */
+const MOST_AHEAD_MS = 600_000;
+
+/** Its clock is ahead: that is why its status is unknown. */
+const isAhead = ({ verdict, last_received: at }: Site): boolean =>
+  verdict === 'unknown' && at !== null && ms(at) > timeOfDay() + MOST_AHEAD_MS;
 
 function countText(count: number | null): string {
   if (count === null) return words.alarmsBeingRead;

@@ -76,7 +76,7 @@ describe('painter', () => {
     painter.paintStill(store.get(), view, 0, true);
     const [hatching, field] = named(canvases.still, 'drawImage').map(({ args }) => args[0]);
     expect(hatching).toMatchObject({ width: 600, height: 800 });
-    expect(field).toMatchObject({ width: 2, height: 2 });
+    expect(field).toMatchObject({ width: 6, height: 6 });
     expect(calls(canvases.still).at(-1)?.name).toBe('stroke');
   });
 
@@ -96,7 +96,7 @@ describe('painter', () => {
         const pictures = named(canvases.still, 'drawImage');
         const [, coloured] = pictures.map(({ args }) => args[0] as HTMLCanvasElement);
         const [put] = coloured ? named(coloured, 'putImageData') : [];
-        return { pictures: pictures.length, alpha: (put?.args[0] as ImageData).data[7] };
+        return { pictures: pictures.length, alpha: (put?.args[0] as ImageData).data[43] };
       };
       const known = paint('range');
       const old = paint('old');

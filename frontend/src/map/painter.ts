@@ -171,7 +171,7 @@ export class Painter {
     const heat = selectHeat(state);
     if (heat && layers.has('field')) {
       const coloured = this.#heatPicture(heat, selectSensor(state), isUnknownMarked);
-      drawPicture(pen, placedField(heat.field, coloured));
+      drawPicture(pen, placedField(heat.field, coloured), true);
       if (isUnknownMarked && !heat.isError) {
         for (const { cells, gap } of hatched(heat.field, heat.old)) {
           this.#hatching.draw(pen, placedField(heat.field, cells), null, gap);

@@ -176,8 +176,8 @@ function useTrail(): readonly Point[] {
 
 type Point = Robot['trail'][number];
 
-/** Age of the oldest point, s. */
-const TRAIL_S = 3_600;
+/** Age of the oldest point, s: more of it would hide the heat map. */
+const TRAIL_S = 60;
 /** Least distance between two points, as in the bridge, m. */
 const STEP_M = 0.1;
 /** The way between points farther apart is unknown, m. */

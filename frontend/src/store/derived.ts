@@ -2,7 +2,7 @@
 import { houseHealth, type HouseHealth } from '../domain/health';
 import type { Field } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
-import { errorField, onExplored } from '../domain/field';
+import { errorField, finer, onExplored } from '../domain/field';
 import { type Range, rangeOf, rounded, withDistinctEnds, withIdeal } from '../domain/ramp';
 import {
   type CellGrid,
@@ -206,7 +206,7 @@ function selectOld(state: AppState, field: Field): Uint8Array | null {
 }
 
 const onMap = memoOne((field: Field) =>
-  memoLast((map: MapPicture | null) => (map ? onExplored(field, map) : field)),
+  memoLast((map: MapPicture | null) => (map ? onExplored(finer(field), map) : finer(field))),
 );
 
 /** The field of the shown moment, as far as the greenhouse is explored. */

@@ -75,7 +75,7 @@ test('what is computed has no estimate: the nearest readings are asked for', asy
   act({ heat: 'estimate' });
   await until(() => field().value !== null);
   expect(count('estimate')).toBe(0);
-  expect(selectHeat(store.get())?.field.values).toHaveLength(2);
+  expect(selectHeat(store.get())?.field).toMatchObject({ sensor: 'vpd', width: 6 });
 });
 
 test('it goes on with the time: what nobody reads becomes less sure', async () => {

@@ -27,8 +27,8 @@ export async function fetchHeat(
 
 /** The server's box contains the pinned tags, widened by its max_distance_m. */
 const ASSUMED_MARGIN_M = 1.5;
-/** Finer cells are indistinguishable on a screen, and load the Wi-Fi. */
-const MAX_CELLS = 60_000;
+/** The page interpolates: more cells would only load the Wi-Fi. */
+const MAX_CELLS = 20_000;
 /** The server's default, used if no tag has a place. */
 const DEFAULT_RESOLUTION_M = 0.1;
 

@@ -111,7 +111,7 @@ def test_the_robot_and_its_trail_plan_and_battery_are_shown_in_the_live_view(
         pytest.approx(-90.0, abs=0.1)
     )
     trail = layer.locator(".robot-trail")
-    expect(trail).to_have_attribute("d", "M3.2 1.6L3.2 1.5L3 1L2.8 1")
+    expect(trail).to_have_attribute("d", "M2.8 1L3 1L3.2 1.5L3.2 1.6")
     hmi.page.emulate_media(media="print")
     expect(trail).to_be_hidden()
     hmi.page.emulate_media(media="screen")

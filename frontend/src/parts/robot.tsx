@@ -46,7 +46,7 @@ export function RobotLayer(): ReactPortal | null {
     <>
       <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-freshness={looks}>
         <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
-          <path className="robot-trail" d={trailPath([...trail].reverse())} />
+          <path className="robot-trail" d={trailPath(trail)} />
           {plan && (
             <polyline
               className="robot-plan"
@@ -191,7 +191,7 @@ export function extended(trail: readonly Point[], next: Point): readonly Point[]
   return [...trail.filter((it) => ageOfPoint(it) >= 0 && ageOfPoint(it) <= TRAIL_S), next];
 }
 
-/** The trail as an SVG path in metres, in either direction, with a break where the way is unknown. */
+/** The trail as an SVG path in metres, with a break where the way is unknown. */
 export const trailPath = (trail: readonly Point[]): string =>
   trail
     .map((it, index) => {

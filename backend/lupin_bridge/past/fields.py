@@ -290,7 +290,9 @@ def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list
 
 def quality(reports: Mapping[str, Report]) -> bytes:
     """`pollers.EstimateQualities`."""
-    return orjson.dumps({"sensors": {name: _quality(one) for name, one in reports.items()}})
+    return orjson.dumps(
+        {"sensors": {name: _estimate_quality(one) for name, one in reports.items()}}
+    )
 
 
 def tags(reports: Mapping[str, Report]) -> bytes:
@@ -317,7 +319,7 @@ def advice(reports: Mapping[str, Report]) -> bytes:
     return orjson.dumps({"sensor_type": sensor_type, "places": report.places})
 
 
-def _quality(report: Report) -> dict[str, Any]:
+def _estimate_quality(report: Report) -> dict[str, Any]:
     record = report.record
     return {
         "fitted_at": moment(report.at_ns if report.is_fitted else None),

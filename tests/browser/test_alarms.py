@@ -109,8 +109,8 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_needs_a_reason(
     domain: int, open_page: OpenPage
 ) -> None:
     with bridge(domain=domain) as running:
-        running.peer.observe(*[warm("a", 43.5, at=(1, 1))] * 2, *[warm("b", 27.0, at=(2, 1))] * 2)
-        running.peer.observe(*[warm("c", 27.0)] * 2, *[warm("c", 22.0)] * 2)
+        two = [*[warm("a", 43.5, at=(1, 1))] * 2, *[warm("b", 27.0, at=(2, 1))] * 2]
+        running.peer.observe(*two, *[warm("c", 27.0)] * 2, *[warm("c", 22.0)] * 2)
         hmi = open_page(running.url, viewport=PHONE)
         hmi.page.keyboard.press("a")
         expect(rows(hmi, "active")).to_have_count(2)
@@ -126,8 +126,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_needs_a_reason(
             for row in rows(hmi, "active").all():
                 expect(row).to_be_in_viewport(ratio=1)
                 # Two lines; on a phone three, with the actions beside them (test_layout).
-                high = place(row).bottom - place(row).top
-                assert high <= (64 if viewport == WIDE else 96)
+                assert height(row) <= (64 if viewport == WIDE else 96)
                 if viewport == WIDE:
                     tools = row.locator(".alarm-tools button").all()
                     assert len({place(each).top for each in tools}) == 1
@@ -146,11 +145,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_needs_a_reason(
             expect(hmi.page.get_by_role("button", name="Unshelve")).to_have_count(0)
         # A small screen has no more lines, whatever the value.
         running.peer.observe(warm("b", 26.03))
-        near = fact(rows(hmi, "active").filter(has_text="Tag b"), "now")
-        expect(near).to_contain_text("now just above 26.0")
-        hmi.resize(1024, 768)
-        assert all(place(row).bottom - place(row).top <= 64 for row in rows(hmi, "active").all())
-        hmi.resize(**WIDE)
+        expect_few_lines(hmi, "now just above 26.0")
         # The critical one.
         expect(times).to_have_text(["For 15 min", "For 1 h"])
         for each in times.all():
@@ -174,6 +169,17 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_needs_a_reason(
         act(hmi, "b", "Unshelve")
         leave(hmi)
         expect(rows(hmi, "active")).to_have_count(2)
+
+
+def height(row: Locator) -> float:
+    return place(row).bottom - place(row).top
+
+
+def expect_few_lines(hmi: Hmi, value: str) -> None:
+    expect(fact(rows(hmi, "active").filter(has_text="Tag b"), "now")).to_contain_text(value)
+    hmi.resize(1024, 768)
+    assert all(height(row) <= 64 for row in rows(hmi, "active").all())
+    hmi.resize(**WIDE)
 
 
 def apart(one: Locator, other: Locator) -> bool:

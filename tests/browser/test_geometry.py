@@ -216,13 +216,17 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     status, map_ = places(hmi, ".health", ".map-panel")
     assert (status.left, status.bottom) == (map_.left, map_.top)
     assert map_.right > 0.6 * 1280
-    # The map of a long one is as wide as the page, and the table has the height above it.
-    hmi.resize(1440, 900)
-    hmi.go()
-    hmi.expect_map()
+
+
+def test_a_long_greenhouse_is_as_wide_as_the_page_below_its_table(
+    running: Bridge, open_page: OpenPage
+) -> None:
+    running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
+    hmi = open_page(running.url, viewport={"width": 1440, "height": 900})
+    narrow = places(hmi, ".map-panel")[0].right
     running.peer.publish_map(occupancy_grid([[0] * 60] * 8))
     expect(hmi.page.locator(".panels")).to_have_attribute("data-long", "true")
-    status, map_, table = places(hmi, *parts)
+    status, map_, table = places(hmi, ".health", ".map-panel", ".list")
     assert (map_.left, map_.right, map_.bottom) == (0, 1440, 900)
     assert status.right == table.left
     assert status.bottom == table.bottom == map_.top > 400

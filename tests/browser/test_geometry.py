@@ -170,6 +170,14 @@ def running(domain: int) -> Iterator[Bridge]:
         yield empty
 
 
+def expect_status_beside_a_card(hmi: Hmi) -> None:
+    """With a long greenhouse, the status is a line while a card is open."""
+    expect(hmi.test_id("health-strip")).to_be_hidden()
+    hmi.page.locator("tbody tr[data-tag-id]").first.click()
+    expect(hmi.test_id("health-strip")).to_be_visible()
+    hmi.page.keyboard.press("Escape")
+
+
 def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     running: Bridge, open_page: OpenPage
 ) -> None:
@@ -226,10 +234,7 @@ def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     assert (map_.left, map_.right, map_.bottom) == (0, 1440, 900)
     assert status.right == table.left
     assert status.bottom == table.bottom == map_.top > 400
-    expect(hmi.test_id("health-strip")).to_be_hidden()
-    hmi.page.locator("tbody tr[data-tag-id]").first.click()
-    expect(hmi.test_id("health-strip")).to_be_visible()
-    hmi.page.keyboard.press("Escape")
+    expect_status_beside_a_card(hmi)
     # A tall one leaves the table what it does not need.
     running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
     hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")

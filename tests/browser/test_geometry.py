@@ -12,7 +12,7 @@ from geometry_msgs.msg import Point, Pose
 from playwright.sync_api import expect
 
 import lupin_bridge
-from tests.browser.hmi import OpenPage, Pixel
+from tests.browser.hmi import Hmi, OpenPage, Pixel
 from tests.browser.places import expect_in_reach, places
 from tests.support.messages import occupancy_grid, scan
 from tests.support.web import Bridge, bridge

@@ -12,7 +12,7 @@ from geometry_msgs.msg import Point, Pose
 from playwright.sync_api import expect
 
 import lupin_bridge
-from tests.browser.hmi import OpenPage, Pixel
+from tests.browser.hmi import Hmi, OpenPage, Pixel
 from tests.browser.places import expect_in_reach, places
 from tests.support.messages import occupancy_grid, scan
 from tests.support.web import Bridge, bridge
@@ -170,6 +170,14 @@ def running(domain: int) -> Iterator[Bridge]:
         yield empty
 
 
+def expect_status_beside_a_card(hmi: Hmi) -> None:
+    """With a long greenhouse, the status is a line while a card is open."""
+    expect(hmi.test_id("health-strip")).to_be_hidden()
+    hmi.page.locator("tbody tr[data-tag-id]").first.click()
+    expect(hmi.test_id("health-strip")).to_be_visible()
+    hmi.page.keyboard.press("Escape")
+
+
 def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
     running: Bridge, open_page: OpenPage
 ) -> None:
@@ -230,10 +238,7 @@ def test_a_long_greenhouse_is_as_wide_as_the_page_below_its_table(
     assert (map_.left, map_.right, map_.bottom) == (0, 1440, 900)
     assert status.right == table.left
     assert status.bottom == table.bottom == map_.top > 400
-    expect(hmi.test_id("health-strip")).to_be_hidden()
-    hmi.page.locator("tbody tr[data-tag-id]").first.click()
-    expect(hmi.test_id("health-strip")).to_be_visible()
-    hmi.page.keyboard.press("Escape")
+    expect_status_beside_a_card(hmi)
     # A tall one leaves the table what it does not need.
     running.peer.publish_map(occupancy_grid([[0] * 20] * 40))
     hmi.expect(lambda: places(hmi, ".map-panel")[0].right < 0.8 * narrow, "a slim map")

@@ -36,7 +36,7 @@ export function fieldPixels({ width, height, values }: Field, shade: Shade) {
     if (Number.isNaN(value)) return;
     const { rgb, alpha } = shade(value, cell);
     const at = ((height - 1 - Math.floor(cell / width)) * width + (cell % width)) * 4;
-    data.set(rgb, at);
+    [data[at], data[at + 1], data[at + 2]] = rgb;
     data[at + 3] = 255 * alpha;
   });
   return { width, height, data };
@@ -89,10 +89,8 @@ function refined(values: Float32Array, width: number, height: number): Float32Ar
   );
   const share = summed(inside, width, height, LINEAR);
   const weight = summed(known, width, height, LINEAR);
-  const sum = summed(
-    values.map((value) => (Number.isNaN(value) ? 0 : value)),
-    ...([width, height, LINEAR] as const),
-  );
+  const numbers = values.map((value) => (Number.isNaN(value) ? 0 : value));
+  const sum = summed(numbers, width, height, LINEAR);
   return sum.map((value, cell) => ((share[cell] ?? 0) < 0.5 ? NaN : value / (weight[cell] ?? 1)));
 }
 

@@ -169,7 +169,7 @@ describe('legend', () => {
 
   test.each([
     [grade(), 'No estimate at the moment'],
-    [grade({ fitted_at: null, share_day: null }), 'it needs ten scans of a sensor'],
+    [grade({ fitted_at: null, share_day: null }), 'ten scans of a sensor are needed'],
   ])('without an estimate, the legend says why: %#', async (said, words) => {
     grades = { temperature: said };
     showField(nearest(estimated([22.4], [0.5], { noEstimate: 'the reason <b>' })));

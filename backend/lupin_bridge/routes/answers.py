@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from typing import Any, Final, TypeVar, cast
 
@@ -367,21 +367,26 @@ async def on_worker(
     return await asyncio.wrap_future(bridge.source.workers.submit(work, cost_s))
 
 
+_NOT_TIMED: Final = nullcontext()
+
+
 async def computed(
     bridge: Bridge,
     client: str,
     key: Hashable,
     write: Callable[[ShouldStop], Answer],
     cost_s: float,
+    *,
+    timed: AbstractContextManager[object] = _NOT_TIMED,
 ) -> Answer:
-    """The answer that `write` makes on a worker, put into the cache.
+    """The answer that `write` makes on a worker, put into the cache; `timed` lasts as long.
 
     Raises:
         BusyError: one computation too many.
         Exception: whatever `write` raised.
 
     """
-    with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times:
+    with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times, timed:
         answer = await on_worker(bridge, write, cost_s * times)
     bridge.cache.put(key, answer)
     return answer

@@ -41,6 +41,7 @@ BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
 
+_NOT_TIMED: Final = nullcontext()
 Documented = dict[int | str, dict[str, Any]]
 
 
@@ -365,9 +366,6 @@ async def on_worker(
 ) -> ResultT:
     """The result of `work(should_stop)`, off the event loop."""
     return await asyncio.wrap_future(bridge.source.workers.submit(work, cost_s))
-
-
-_NOT_TIMED: Final = nullcontext()
 
 
 async def computed(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from typing import Any, Final, TypeVar, cast
 
@@ -41,6 +41,7 @@ BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
 
+_NOT_TIMED: Final = nullcontext()
 Documented = dict[int | str, dict[str, Any]]
 
 
@@ -373,15 +374,17 @@ async def computed(
     key: Hashable,
     write: Callable[[ShouldStop], Answer],
     cost_s: float,
+    *,
+    timed: AbstractContextManager[object] = _NOT_TIMED,
 ) -> Answer:
-    """The answer that `write` makes on a worker, put into the cache.
+    """The answer that `write` makes on a worker, put into the cache; `timed` lasts as long.
 
     Raises:
         BusyError: one computation too many.
         Exception: whatever `write` raised.
 
     """
-    with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times:
+    with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times, timed:
         answer = await on_worker(bridge, write, cost_s * times)
     bridge.cache.put(key, answer)
     return answer

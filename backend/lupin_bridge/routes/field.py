@@ -158,12 +158,12 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
     """
     snapshot, occupancy = newest_of(bridge), bridge.source.occupancy_map()
     cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
-    with bridge.metrics.field_seconds.time():
-        return await computed(
-            *(bridge, client, etag),
-            lambda stop: field.plan(snapshot, etag, occupancy).write(stop),
-            cost_s,
-        )
+    return await computed(
+        *(bridge, client, etag),
+        lambda stop: field.plan(snapshot, etag, occupancy).write(stop),
+        cost_s,
+        timed=bridge.metrics.field_seconds.time(),
+    )
 
 
 async def _answer(request: Request, field_format: FieldFormat | None) -> Response:

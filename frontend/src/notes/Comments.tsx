@@ -1,5 +1,6 @@
 import { type JSX, type SyntheticEvent, useEffect, useRef, useState } from 'react';
 
+import { Refusal } from '../contract/api';
 import { postNote, withdrawComment } from '../contract/people';
 import { failureText } from '../domain/format';
 import { shown } from '../domain/text';
@@ -146,10 +147,18 @@ export function CommentField({
     setSending(true);
     const until = moment === null ? {} : { until: moment.toFixed(3) };
     const post = async (): Promise<void> => {
-      for (let [subject] = left.current; subject !== undefined; [subject] = left.current) {
-        await postNote({ kind: 'comment', subject, text: text.trim(), ...until });
-        left.current.shift();
+      let why: Refusal | null = null;
+      for (const subject of left.current) {
+        try {
+          await postNote({ kind: 'comment', subject, text: text.trim(), ...until });
+          left.current = left.current.filter((each) => each !== subject);
+        } catch (error) {
+          // An alarm that is gone by now keeps the comment from no other.
+          if (!(error instanceof Refusal) || error.status !== 404) throw error;
+          why = error;
+        }
       }
+      if (why !== null) throw why;
     };
     post().then(onDone, (error: unknown) => {
       setSending(false);

@@ -1,3 +1,5 @@
+import { flushSync } from 'react-dom';
+
 import { timeOfDay } from '../clock';
 import { onChange, store } from './app';
 import { createStore } from './create';
@@ -5,13 +7,11 @@ import { createStore } from './create';
 const system = window.matchMedia('(prefers-color-scheme: dark)');
 const forced = window.matchMedia('(forced-colors: active)');
 
-/**
- * Since when the page is being printed, ms since the epoch; null: it is not. Components that use it
- * render before the browser takes the page: such an update does not wait for a frame.
- */
+/** Since when the page is being printed, ms since the epoch; null: it is not. */
 export const printing = createStore<number | null>(null);
 
-window.addEventListener('beforeprint', () => printing.set(timeOfDay()));
+// Render synchronously: `window.print` takes the page before it returns to the script that called it.
+window.addEventListener('beforeprint', () => flushSync(() => printing.set(timeOfDay())));
 window.addEventListener('afterprint', () => printing.set(null));
 
 /** On paper the pointer leaves no mark. */

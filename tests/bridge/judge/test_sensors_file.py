@@ -120,6 +120,10 @@ def test_day_night_and_species_have_their_own_ranges_and_an_undeclared_sensor_no
         ("sensors/temperature/unit", 5, "unit: Input should be a valid string, not 5"),
         ("sensors/temperature/ideal", [18, 18], "ideal is [18.0, 18.0], and low must be less than"),
         ("sensors/temperature/ideal", [18], "temperature.ideal.1: Field required"),
+        # The page reads the same file, and takes each of these for a list of numbers.
+        ("sensors/temperature/ideal", ["18", "26"], "ideal.0: Input should be a valid number"),
+        ("sensors/temperature/ideal", [18, True], "ideal.1: Input should be a valid number, not T"),
+        ("sensors/temperature/ideal", {"low": 1, "high": 2}, "ideal: Input should be a valid arra"),
         ("sensors/temperature/critical", [19, 35], "is [19.0, 35.0], inside ideal [18.0, 26.0]"),
         ("sensors/temperature/ideal", None, "critical is given, but no ideal range"),
         ("sensors/temperature/night", [1, 2], "night: Input should be an object, not [1, 2]"),

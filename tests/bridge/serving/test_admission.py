@@ -191,6 +191,8 @@ async def test_with_all_places_taken_the_answer_is_503_until_one_is_free(domain:
             assert busy.status_code == 503
             assert (busy.headers["retry-after"], busy.headers["vary"]) == ("1", "Accept")
             assert "the limit is 2" in busy.json()["detail"]
+            # No field was computed, so none was quick.
+            assert "\nlupin_field_seconds_count 0.0\n" in (await it.http.get("/metrics")).text
             # Live and cheap answers take no place.
             for live in ("/api/state", "/api/health"):
                 assert (await it.http.get(live)).status_code == 200

@@ -260,7 +260,7 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
         requested = sites.http.get("/api/report").json()["sites"]
         scans = next(each["scans"] for each in requested if each["site"] == "warm")
         assert scans > 0
-        expect(rows.first.locator("td").first).to_have_text(str(scans))
+        expect(rows.first.locator("td").first).to_have_text(f"{scans:,}")
         expect(rows.first.locator("td").nth(4)).to_have_text("5")
         expect(rows.nth(1).locator("td").nth(4)).to_have_text("1 (last known)")
         # The choice of greenhouses and of the period.

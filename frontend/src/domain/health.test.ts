@@ -157,7 +157,7 @@ describe('a reason in words', () => {
       // Only just within the critical limit of 10, and far from the ideal range.
       { value: 10.39, limit: 10, ...held(10.4) } as const,
       null,
-      `Temperature just below 10.4${NBSP}°C (critical)`,
+      `Temperature must rise above 10.4${NBSP}°C (critical)`,
     ],
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,

@@ -165,10 +165,13 @@ export function reasonText(
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
     const reading = beyondLimitText(sensor, reason.value, edge);
-    // "Just below 350" names the limit itself.
+    // "Just below 350" names the limit itself, but not what a value back in its range must pass.
     const isNear = reading !== readingText(sensor, reason.value);
     const limit = isNear ? '' : `, ${limitText(reason, (each) => valueText(sensor, each))}`;
-    const text = `${label} ${reading}${ago}${limit}`;
+    const text =
+      isNear && reason.release !== undefined
+        ? `${beyondText(sensors, reason)}${ago}`
+        : `${label} ${reading}${ago}${limit}`;
     return isMarked ? text : ratedText(text, reason.verdict);
   }
   switch (kind) {

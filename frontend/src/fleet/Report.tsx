@@ -3,6 +3,7 @@ import { useState, type JSX } from 'react';
 
 import { timeOfDay, timeZone } from '../clock';
 import type { Note, WireTime } from '../contract/types';
+import { numberText } from '../domain/format';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import { VIEW_WORDS } from '../words/fleetViews';
@@ -125,7 +126,7 @@ function Row({ row, isLive }: { row: SiteReport; isLive: boolean }): JSX.Element
         <a href={pageOf(row)}>{row.name}</a>
       </th>
       {COUNTED.map((each) => (
-        <td key={each}>{row[each]}</td>
+        <td key={each}>{numberText(row[each], 0)}</td>
       ))}
       <td>
         {row.active_alarms ?? S.noValue}

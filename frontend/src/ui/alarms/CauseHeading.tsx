@@ -96,9 +96,9 @@ export function CauseHeading({
             {group === 'shelved' && (
               <span className="alarm-facts faint">{[...shelves].join('; ')}</span>
             )}
-            <span className="alarm-facts faint">
-              {isOfOne && airOf(alarm.reason) ? parts : tagsText(tags)}
-            </span>
+            {isOfOne && !airOf(alarm.reason) ? null : (
+              <span className="alarm-facts faint">{isOfOne ? parts : tagsText(tags)}</span>
+            )}
           </span>
         </span>
         <Values alarm={alarm} of={isOfOne ? '' : whereText(alarm)} />

@@ -4,6 +4,7 @@ import { createRoot } from 'react-dom/client';
 import './styles/tokens.css';
 import './styles/base.css';
 import './styles/layout.css';
+import './styles/devices.css';
 import './styles/map.css';
 import './styles/legend.css';
 import './styles/health.css';

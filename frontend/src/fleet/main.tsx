@@ -5,6 +5,7 @@ import '../styles/tokens.css';
 import '../styles/base.css';
 import '../styles/health.css';
 import '../styles/fleet.css';
+import '../styles/fleet-tables.css';
 import { LANGUAGE } from '../strings';
 import { ErrorBoundary } from '../ui/ErrorBoundary';
 import { follow, type Seen } from './follow';

@@ -83,7 +83,10 @@ const TABLE: Table = {
   domain: ['contract', 'geometry', 'strings'],
   connection: ['contract', 'clock'],
   draw: ['contract', 'geometry', 'domain'],
-  store: ['strings', 'clock', 'contract', 'geometry', 'domain', 'connection', 'npm:react'],
+  store: [
+    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'connection'],
+    ...['npm:react', 'npm:react-dom'],
+  ],
   map: [
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
     ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],

@@ -234,10 +234,9 @@ class Span(NamedTuple):
     @classmethod
     def __get_pydantic_core_schema__(cls, _: Any, handler: Callable[[Any], Any]) -> Any:
         """In a file it is a list: pydantic would take an object too, and texts for numbers."""
-        from pydantic_core import core_schema  # noqa: PLC0415  # only for a file that is read
+        from pydantic import AfterValidator  # noqa: PLC0415  # only for a file that is read
 
-        pair = handler(tuple[Limit, Limit])
-        return core_schema.no_info_after_validator_function(cls._make, pair)
+        return handler(Annotated[tuple[Limit, Limit], AfterValidator(cls._make)])
 
     @property
     def width(self) -> float:

@@ -240,7 +240,7 @@ async def connection(
         stack.enter_context(theirs)
         await until(lambda: made, "the connection")
         yield made[0], theirs, ended
-    made[0].abort()
+    tear_down(made[0])
     server.close()
     await server.wait_closed()
 

@@ -39,6 +39,7 @@ from tests.support.past_queries import (
     tags_at,
     unpicklable,
 )
+from tests.support.proc_stat import resident_mb
 from tests.support.waiting import PATIENCE_S, until
 
 NOTE = Note("", time.time_ns(), "anna", COMMENT, "site", "a comment")
@@ -203,15 +204,20 @@ def now(path: Path) -> Now:
     return Now(NOW_NS, "map", Condition(JournalState.RECORDING, path=str(path)))
 
 
-async def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size(path: Path) -> None:
+async def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size_with_their_memory(
+    path: Path,
+) -> None:
     async with looking_back() as past:
         assert await past.ask(partial(tags_at, NOW_NS), now(path), 0.0) == 1
         nice = os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
         assert await past.ask(at_work, now(path), 0.0) == (0, nice)
-        for count in (0, 3_000_000):
+        pid = past.pid or 0
+        before_mb = resident_mb(pid)
+        for count in (0, 20_000_000, 20_000_000):
             answered: Answered = await past.ask(partial(sevens, count), now(path), 0.0)
             assert answered.answer is not None
             assert answered.answer.body == b"7" * count
+        await until(lambda: resident_mb(pid) < before_mb + 10.0, "the memory to be free")
         assert past.starts == 1
 
 

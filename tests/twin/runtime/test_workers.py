@@ -299,6 +299,15 @@ def test_jobs_wait_for_observations_except_one_a_second(made: Stage, cost_s: flo
     assert [made.delivered(), made.delivered()] == [1, 1]
 
 
+def test_small_jobs_that_wait_for_observations_hold_up_no_large_one(made: Stage) -> None:
+    made.is_behind = True
+    first, *_ = [made.ask() for _ in range(3)]
+    first.set_result(0)
+    assert made.delivered() == 0
+    large = made.ask(NOT_SMALL_S)
+    made.have_begun(first, large)
+
+
 @pytest.mark.parametrize("cost_s", [SMALL_S, NOT_SMALL_S])
 def test_the_number_of_waiting_jobs_is_limited_and_one_more_has_to_retry(
     made: Stage, cost_s: float

@@ -30,6 +30,9 @@ PATIENCE: Final = 2.0
 LARGE_THREADS: Final = 2
 SMALL_THREADS: Final = 1
 
+# How often a thread asks again whether a job is admitted, s.
+_CHECK_S: Final = 0.05
+
 # Plain Python code keeps all other threads waiting; after this long, s, it pauses.
 TURN_S: Final = 0.002
 
@@ -83,7 +86,8 @@ class Job(Future[ResultT], Generic[ResultT]):
 class Workers:
     """A pool of threads, and the jobs that wait for one. Any thread may call it.
 
-    The threads start with the first job. `clock` tells seconds and never jumps.
+    The threads start with the first job. `clock` tells seconds and never jumps. A job begins once
+    `admits(cost_s)`, which is asked in the order of the jobs, and again after a while.
     """
 
     def __init__(
@@ -92,9 +96,11 @@ class Workers:
         clock: Callable[[], float] = time.monotonic,
         large_threads: int = LARGE_THREADS,
         small_threads: int = SMALL_THREADS,
+        admits: Callable[[float], bool] = lambda _: True,
     ) -> None:
         self._name = name
         self._clock = clock
+        self._admits = admits
         self._only_small = [False] * large_threads + [True] * small_threads
         self._waiting: list[Job[object]] = []
         self._running: set[Job[object]] = set()
@@ -129,6 +135,11 @@ class Workers:
             self._changed.notify_all()
         return job
 
+    def look_again(self) -> None:
+        """Begin what `admits` allows by now, without delay."""
+        with self._changed:
+            self._changed.notify_all()
+
     def close(self) -> None:
         """Drop waiting jobs, and ask running ones to stop. Does not wait for them."""
         with self._changed:
@@ -162,12 +173,13 @@ class Workers:
         with self._changed:
             while not self._is_closed:
                 mine = [job for job in self._waiting if job.cost_s <= SMALL_S or not only_small]
-                if mine:
-                    job = min(mine, key=lambda job: job.due_s)  # if equal, the first that arrived
+                ordered = sorted(mine, key=lambda job: job.due_s)  # stable: as they arrived
+                admitted = (job for job in ordered if self._admits(job.cost_s))
+                if (job := next(admitted, None)) is not None:
                     self._waiting.remove(job)
                     self._running.add(job)
                     return job
-                self._changed.wait()
+                self._changed.wait(_CHECK_S if mine else None)
             return None
 
 
@@ -194,17 +206,15 @@ def in_turns(
 MAX_JOBS: Final = 32
 # Time between two small, or two large, jobs while the owner's thread is behind, s.
 PACE_S: Final = 1.0
-# How often a worker checks whether the owner's thread is still behind, s.
-_CHECK_S: Final = 0.05
 
 
 class JobQueue:
     """Jobs of one thread, which owns the queue, gets the answers, and is not blocked by them.
 
-    A worker begins a job only when every answer was delivered, because the largest takes about
-    200 MB. While `is_behind()` (messages wait for the owner's thread), one job a second begins.
-    `wake()` is called in another thread when `deliver` has something to do. `clock` returns seconds
-    and never jumps; the other arguments are those of `Workers`. `answered` counts answers,
+    A job begins only when every answer was delivered, because the largest takes about 200 MB. While
+    `is_behind()` (messages wait for the owner's thread), one small and one large job begin a
+    second. `wake()` is called in another thread when `deliver` has something to do. `clock` returns
+    seconds and never jumps; the other arguments are those of `Workers`. `answered` counts answers,
     `slowest_s` is the longest that one took.
     """
 
@@ -220,11 +230,10 @@ class JobQueue:
     ) -> None:
         self.answered = 0
         self.slowest_s = 0.0
-        self._workers = Workers(name, large_threads=large_threads, small_threads=small_threads)
+        self._workers = Workers(name, clock, large_threads, small_threads, self._admits)
         self._wake = wake
         self._is_behind = is_behind
         self._clock = clock
-        self._changed = threading.Condition()
         # Of small jobs, and of large ones: those without an answer, and when the last was begun.
         self._open = [0, 0]
         self._begun_s = [-math.inf, -math.inf]
@@ -260,7 +269,6 @@ class JobQueue:
             reply(answer)
 
         def run(should_stop: ShouldStop) -> None:
-            self._wait(is_large, should_stop)
             try:
                 answer = work(should_stop)
             except Exception as error:  # noqa: BLE001  # handed to whoever waits
@@ -280,9 +288,8 @@ class JobQueue:
         try:
             self._done[0]()
         finally:
-            with self._changed:
-                self._done.popleft()
-                self._changed.notify_all()
+            self._done.popleft()
+            self._workers.look_again()
             if self._done:
                 self._wake()
 
@@ -290,11 +297,9 @@ class JobQueue:
         """End the threads; their current work is abandoned."""
         self._workers.close()
 
-    def _wait(self, is_large: bool, should_stop: ShouldStop) -> None:
-        with self._changed:
-            while not should_stop() and (
-                self._done
-                or (self._is_behind() and self._clock() - self._begun_s[is_large] < PACE_S)
-            ):
-                self._changed.wait(_CHECK_S)
-            self._begun_s[is_large] = self._clock()
+    def _admits(self, cost_s: float) -> bool:
+        is_large, now_s = cost_s > SMALL_S, self._clock()
+        if self._done or (self._is_behind() and now_s - self._begun_s[is_large] < PACE_S):
+            return False
+        self._begun_s[is_large] = now_s
+        return True

@@ -125,3 +125,6 @@ def test_a_clock_behind_the_recording_is_named_once_with_what_to_do_first(
         running.peer.observe(scan("1", {"co2": 7.0}))
         hmi.page.get_by_role("button", name=re.compile("Tags")).click()
         expect(hmi.cell("1", "co2")).to_have_text("7")
+        age = hmi.row("1").locator(".cell-age")
+        expect(age).to_have_text("unknown")
+        assert age.evaluate("it => it.scrollWidth <= it.clientWidth"), "the word is cut"

@@ -19,6 +19,27 @@ class FakeSocket {
 
 afterEach(() => {
   vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test('a page that wakes after a silence says so at once, not when its next attempt has failed', () => {
+  vi.useFakeTimers();
+  vi.stubGlobal('WebSocket', FakeSocket);
+  const lost: boolean[] = [];
+  const stop = follow('ws://test/ws/sites', ({ lostAt }) => lost.push(lostAt !== null));
+  const archive = { is_reachable: true, message: '', since: null };
+  const sites = { type: 'sites', is_whole: true, archive, sites: [], gone: [] };
+  const receive = (): void => FakeSocket.last?.onmessage?.({ data: JSON.stringify(sites) });
+  FakeSocket.last?.onopen?.();
+  receive();
+  expect(lost).toEqual([false, false]);
+  vi.advanceTimersByTime(4_000);
+  document.dispatchEvent(new Event('visibilitychange'));
+  expect(lost.at(-1)).toBe(true);
+  FakeSocket.last?.onopen?.();
+  receive();
+  expect(lost.at(-1)).toBe(false);
+  stop();
 });
 
 test('a connection that is refused may be one of a session that has ended', () => {

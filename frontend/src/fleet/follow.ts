@@ -26,7 +26,9 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
       return frame ? { kind: 'frame', frame } : { kind: 'passed over' };
     },
     onConnection: ({ socket }) => {
-      if (socket.kind === 'closed' && seen.lostAt === null) update({ lostAt: epochOf(receivedAt) });
+      // Nothing is lost before anything came; after sleep or a silence, the attempt may take long to fail.
+      const isLost = socket.kind === 'closed' || (socket.kind === 'opening' && seen.archive);
+      if (isLost && seen.lostAt === null) update({ lostAt: epochOf(receivedAt) });
     },
     onFrame: (frame) => {
       receivedAt = now();

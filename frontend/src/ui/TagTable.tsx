@@ -19,7 +19,7 @@ import { withSort, withTag } from '../store/view';
 import { selectCatalogue, selectShownColumns } from '../store/derived';
 import { useSelected } from '../store/create';
 import { hourAgo, selectHourAgo } from '../store/hourAgo';
-import { selectClockFault, selectTags } from '../store/moment';
+import { selectClockFault, selectHasTime, selectTags } from '../store/moment';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Icon } from '../widgets/controls';
@@ -53,6 +53,7 @@ export function TagTable(): JSX.Element {
     () => ({ catalogue, sensors, chosen, hidden, then, isTimed }),
     [catalogue, sensors, chosen, hidden, then, isTimed],
   );
+  const hasTime = useApp(selectHasTime);
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, lines.length);
@@ -100,7 +101,9 @@ export function TagTable(): JSX.Element {
           }
         />
         {has('health') && <col className="col-health" />}
-        {has('age') && <col className="col-age" />}
+        {has('age') && (
+          <col className="col-age" style={letters(hasTime ? 0 : S.ageUnknown.length)} />
+        )}
         {sensors.map((sensor) => (
           <col
             key={sensor.name}

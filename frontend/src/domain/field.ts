@@ -95,8 +95,8 @@ function refined(values: Float32Array, width: number, height: number): Float32Ar
 }
 
 /**
- * The field in finer cells, without the steps of its own: values are interpolated between known cells, and
- * the edge of what is known is rounded. The centre of an unknown cell stays unknown.
+ * The field in finer cells, so that its own do not show as steps: values are interpolated between known
+ * cells, and the edge of what is known is rounded. The centre of an unknown cell stays unknown.
  */
 export function finer(field: Field): Field {
   const { width, height, sureness } = field;

@@ -138,7 +138,7 @@ export function CommentField({
   const [isSending, setSending] = useState(false);
   const field = useRef<HTMLTextAreaElement>(null);
   /** Those still without the comment: saving again after a failure repeats none. */
-  const left = useRef([...subjects]);
+  const left = useRef(subjects);
   useEffect(() => {
     field.current?.focus();
   }, []);

@@ -107,10 +107,10 @@ test('who may write does, and withdraws their own words alone', async () => {
 test('each alarm of a heading gets the comment once, also after a failure', async () => {
   // The first alarm is gone, which the bridge says each time; the third has no connection at first.
   const answers = [404, 200, 0, 404, 200, 200];
-  const heard: unknown[] = [];
+  const posted: unknown[] = [];
   vi.stubGlobal('fetch', (_: URL, { body }: { body: string }) => {
     const { subject } = JSON.parse(body) as { subject: string };
-    heard.push(subject);
+    posted.push(subject);
     const status = answers.shift();
     const detail = 'no such alarm';
     return status
@@ -130,7 +130,7 @@ test('each alarm of a heading gets the comment once, also after a failure', asyn
   await waitFor(() => {
     expect(onDone).toHaveBeenCalledOnce();
   });
-  expect(heard.join(' ')).toBe('alarm:a alarm:b alarm:c alarm:a alarm:c alarm:a');
+  expect(posted.join(' ')).toBe('alarm:a alarm:b alarm:c alarm:a alarm:c alarm:a');
 });
 
 test('Escape leaves the field, and not what it stands in', () => {

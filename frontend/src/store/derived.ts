@@ -205,9 +205,10 @@ function selectOld(state: AppState, field: Field): Uint8Array | null {
   return oldBy(gridOf(field), readBy(selectTags(state), health.tags, selectSensor(state)));
 }
 
-const onMap = memoOne((field: Field) =>
-  memoLast((map: MapPicture | null) => (map ? onExplored(finer(field), map) : finer(field))),
-);
+const onMap = memoOne((field: Field) => {
+  const fine = finer(field);
+  return memoLast((map: MapPicture | null) => (map ? onExplored(fine, map) : fine));
+});
 
 /** The field of the shown moment, as far as the greenhouse is explored. */
 function selectField(state: AppState): Field | null {

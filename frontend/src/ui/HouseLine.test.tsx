@@ -104,6 +104,7 @@ test.each([
   expect(show(status({ reason: 'paused' }))).toMatch(/^no tag overdue/);
   const then = { ...NO_HOUSE, snapshot: snapshotOf(latest, 0, null), health };
   act(() => {
+    goLive();
     view({ moment: 1 + late });
     receive(withPast({ at: 1 + late, house: then }));
   });

@@ -124,6 +124,15 @@ describe('table', () => {
     expect(why?.textContent).toBe('Stressed: Humidity: the sensor returns no value');
   });
 
+  test('a reading of an earlier scan than the others has its own age', () => {
+    const taken = { temperature: 100, humidity: 41, co2: 39 };
+    const all = Object.entries(taken).flatMap(([name, sec]) => readings({ [name]: 20 }, sec));
+    showTags([wireTag({ readings: all })]);
+    render(<TagTable />);
+    const aged = [...row('1').querySelectorAll('[data-sensor]:has(.own-age)')];
+    expect(aged.map((each) => each.getAttribute('data-sensor'))).toEqual(['co2']);
+  });
+
   test('sorts by a column, up and down, and says so', () => {
     render(<TagTable />);
     expect(head(/^Status/).getAttribute('aria-sort')).toBe('descending');

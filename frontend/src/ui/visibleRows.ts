@@ -5,7 +5,7 @@ import { inAreas, withHeads, type Line, type Row } from '../domain/table';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectAreaOf, selectRows } from '../store/derived';
-import { printing } from '../store/theme';
+import { isPrinting, printing } from '../store/theme';
 
 /** Up to this many rows, all are rendered. */
 export const SHORT_TABLE = 100;
@@ -109,7 +109,7 @@ export function useVisibleRows(
 }
 
 /** Whether the page is being printed. */
-export const usePaper = (): boolean => useSelected(printing, (since) => since !== null);
+export const usePaper = (): boolean => useSelected(printing, isPrinting);
 
 /**
  * Scrolls the selected row into view once its card is laid out, and again once rows are measured:

@@ -96,7 +96,7 @@ export function CauseHeading({
             {group === 'shelved' && (
               <span className="alarm-facts faint">{[...shelves].join('; ')}</span>
             )}
-            {isOfOne && !airOf(alarm.reason) ? null : (
+            {(!isOfOne || airOf(alarm.reason)) && (
               <span className="alarm-facts faint">{isOfOne ? parts : tagsText(tags)}</span>
             )}
           </span>

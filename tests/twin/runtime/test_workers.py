@@ -21,6 +21,7 @@ from lupin_twin.runtime.workers import (
     PACE_S,
     PATIENCE,
     SMALL_S,
+    SMALL_THREADS,
     TURN_S,
     JobQueue,
     ShouldStop,
@@ -41,9 +42,11 @@ class Clock:
 
 
 @contextmanager
-def workers(**threads: int) -> Iterator[tuple[Workers, Clock]]:
+def workers(
+    large_threads: int = LARGE_THREADS, small_threads: int = SMALL_THREADS
+) -> Iterator[tuple[Workers, Clock]]:
     clock = Clock()
-    running = Workers("test", clock, **threads)
+    running = Workers("test", clock, large_threads, small_threads)
     try:
         yield running, clock
     finally:

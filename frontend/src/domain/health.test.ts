@@ -1,10 +1,12 @@
 import { describe, expect, test } from 'vitest';
 
+import type { HealthReason } from '../contract/types';
 import { S } from '../strings';
 import { held, judgement, NOBODY, reason } from '../testing/health';
 import { CATALOGUE, IN_FAHRENHEIT } from '../testing/sensors';
 import { readings, tag } from '../testing/tags';
 import {
+  causeText,
   houseHealth,
   type HouseHealth,
   rangeReason,
@@ -234,6 +236,22 @@ describe('a reason in words', () => {
   test('beside its mark, it does not say again how bad it is', () => {
     expect(reasonText(CATALOGUE, reason(), null, true)).toBe(
       `Temperature 6.6${NBSP}°C, below 10.0`,
+    );
+  });
+
+  test('beside the value, it does not say that again, unless it reads like its limit', () => {
+    const beside = ['temperature', 'humidity'];
+    const said = (over: Partial<HealthReason>): string =>
+      causeText(CATALOGUE, [reason(over)], null, true, beside);
+    expect(said({})).toBe('Temperature below 10.0');
+    expect(said({ sensor: 'co2', value: 300, limit: 350 })).toBe(`CO₂ 300${NBSP}ppm, below 350`);
+    expect(said({ value: 9.99 })).toBe(`Temperature just below 10.0${NBSP}°C`);
+    const damp = [
+      reason({ sensor: 'humidity', value: 97, limit: 85 }),
+      reason({ sensor: 'vpd', value: 0.11, limit: 0.2 }),
+    ];
+    expect(causeText(CATALOGUE, damp, null, true, beside)).toBe(
+      `Air too damp: Humidity, VPD 0.11${NBSP}kPa`,
     );
   });
 

@@ -150,12 +150,14 @@ export const ratedText = (text: string, verdict: Verdict): string =>
 /**
  * A reason as a sentence without its full stop. `age` is that of the observation behind it, seconds;
  * null: it is recent, shown elsewhere, or not known. `isMarked`: a sign beside it shows the severity.
+ * `beside`: sensors whose values stand beside it, and are not repeated.
  */
 export function reasonText(
   sensors: Catalogue,
   reason: HealthReason,
   age: number | null,
   isMarked = false,
+  beside: readonly string[] = [],
 ): string {
   const { kind, sensor: name, value, limit } = reason;
   const sensor = sensors.named(name);
@@ -167,11 +169,15 @@ export function reasonText(
     const reading = beyondLimitText(sensor, reason.value, edge);
     // "Just below 350" names the limit itself, but not what a value back in its range must pass.
     const isNear = reading !== readingText(sensor, reason.value);
-    const limit = isNear ? '' : `, ${limitText(reason, (each) => valueText(sensor, each))}`;
+    const limit = limitText(reason, (each) => valueText(sensor, each));
     const text =
       isNear && reason.release !== undefined
         ? `${beyondText(sensors, reason)}${ago}`
-        : `${label} ${reading}${ago}${limit}`;
+        : isNear
+          ? `${label} ${reading}${ago}`
+          : beside.includes(name)
+            ? `${label} ${limit}`
+            : `${label} ${reading}${ago}, ${limit}`;
     return isMarked ? text : ratedText(text, reason.verdict);
   }
   switch (kind) {
@@ -248,7 +254,8 @@ export const reasonsText = (
   reasons: readonly HealthReason[],
   age: number | null = null,
   isMarked = false,
-): string => reasons.map((reason) => reasonText(sensors, reason, age, isMarked)).join('; ');
+  beside: readonly string[] = [],
+): string => reasons.map((reason) => reasonText(sensors, reason, age, isMarked, beside)).join('; ');
 
 /** A tag's reasons of one cause (`byCause`) as one: its name, and all its values. */
 export function causeText(
@@ -256,13 +263,14 @@ export function causeText(
   reasons: readonly HealthReason[],
   age: number | null,
   isMarked: boolean,
+  beside: readonly string[] = [],
 ): string {
   const air = reasons.map(airOf)[0];
   if (!air || reasons.length < 2 || reasons.every(isBack)) {
-    return reasonsText(sensors, reasons, age, isMarked);
+    return reasonsText(sensors, reasons, age, isMarked, beside);
   }
   const ago = age === null ? '' : ` (${S.agoSuffix(ageText(age))})`;
-  return `${S.alarmWhat(S.airCause[air], valuesText(sensors, reasons, isMarked))}${ago}`;
+  return `${S.alarmWhat(S.airCause[air], valuesText(sensors, reasons, isMarked, beside))}${ago}`;
 }
 
 /** Sensors with their values, if there are any, in one line. */
@@ -270,12 +278,12 @@ export function valuesText(
   sensors: Catalogue,
   reasons: readonly HealthReason[],
   isMarked = false,
+  beside: readonly string[] = [],
 ): string {
   const texts = reasons.map(({ sensor: name, value, verdict }) => {
     const sensor = sensors.named(name);
-    const text = [nameOf(sensor), ...(value === null ? [] : [readingText(sensor, value)])].join(
-      ' ',
-    );
+    const isValued = value !== null && !beside.includes(name);
+    const text = isValued ? `${nameOf(sensor)} ${readingText(sensor, value)}` : nameOf(sensor);
     return isMarked ? text : ratedText(text, verdict);
   });
   return [...new Set(texts)].join(', ');

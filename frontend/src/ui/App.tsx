@@ -1,4 +1,4 @@
-import { type CSSProperties, type JSX, useSyncExternalStore } from 'react';
+import type { CSSProperties, JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
@@ -13,6 +13,7 @@ import { Header, SimulatedNote } from './Header';
 import { HealthMark } from './HealthMark';
 import { HealthSummary } from './HealthSummary';
 import { Icon } from '../widgets/controls';
+import { useMedia } from '../widgets/useMedia';
 import { MapPanel } from './MapPanel';
 import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
@@ -29,7 +30,7 @@ export function App({ kiosk }: { kiosk: boolean }): JSX.Element {
   const isRecorded = useApp(selectIsRecorded);
   const aspect = useApp(selectAspect);
   const isWide = (aspect ?? 0) >= WIDE;
-  const isRoomy = useSyncExternalStore(onRoom, () => roomy.matches);
+  const isRoomy = useMedia(roomy);
   const hasCharts = useApp((state) => state.view.chart !== null);
   const isStatusAbove = isWide && isRoomy && (kiosk || !hasCharts);
 
@@ -91,11 +92,6 @@ const LONG = 5;
 
 /** Has room for the status above the map of a wide greenhouse. */
 const roomy = window.matchMedia('(min-width: 64em) and (min-height: 43em)');
-
-function onRoom(listener: () => void): () => void {
-  roomy.addEventListener('change', listener);
-  return () => roomy.removeEventListener('change', listener);
-}
 
 /** Moves the focus in code, because the URL fragment belongs to the permalink. */
 function skipToTable(event: React.MouseEvent): void {

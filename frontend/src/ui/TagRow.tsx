@@ -29,6 +29,8 @@ export interface RowLook {
   readonly catalogue: Catalogue;
   /** Sensors that have a column. */
   readonly sensors: readonly Sensor[];
+  /** Those whose column is in sight: reasons do not repeat their values. */
+  readonly beside: readonly string[];
   readonly chosen: string;
   /** Hidden columns. */
   readonly hidden: readonly string[];
@@ -57,7 +59,7 @@ export const TagRow = memo(function TagRow(props: Props): JSX.Element {
   const others = health.reasons.filter(({ kind }) => !tag.failedAttempt || kind !== 'scan_failed');
   const texts = byCause(others).map((reasons, place): ReactNode =>
     // The row's mark already gives the worst reason's verdict.
-    causeText(catalogue, reasons, null, place === 0),
+    causeText(catalogue, reasons, null, place === 0, look.beside),
   );
   if (tag.failedAttempt) {
     const attempt = (

@@ -111,7 +111,7 @@ describe('table', () => {
     expect(cell('9', 'temperature')).toBe('20.0');
     expect(cell('9', 'humidity')).toBe('failed');
     // Blank to the eye: `.unseen`.
-    expect(cell('9', 'co2')).toBe('no sensor');
+    expect(cell('9', 'co2')).toBe('No sensor');
     expect(cell('10', 'temperature')).toBe('high Temperature above 35.0\u00a0°C: 40.0');
     expect(row('9').textContent).toContain('rose91');
     // Below the name where the column has no room; without a species there is nothing to say.
@@ -253,12 +253,15 @@ describe('table', () => {
   test('a verdict has its first reason beside it, and how many more there are', () => {
     showTags(tags, judgement({ a: [reason()], b: 'healthy' }));
     render(<TagTable />);
-    expect(row('a').querySelector('.why')?.textContent).toBe('Temperature 6.6\u00a0°C, below 10.0');
+    expect(row('a').querySelector('.why')?.textContent).toBe('Temperature below 10.0');
     expect(row('a').querySelector('.why-count')).toBeNull();
     expect(row('b').querySelector('.why')).toBeNull();
     flush(() => {
       showTags(tags, judgement({ a: [reason(), reason({ sensor: 'humidity', value: 20 })] }));
+      prefer({ hidden: ['temperature'] });
     });
+    // Without its column, the value stays.
+    expect(row('a').querySelector('.why')?.textContent).toMatch(/^Temperature 6.6/);
     expect(row('a').querySelector<HTMLElement>('.why-count')?.dataset['count']).toBe('1');
     expect(row('a').querySelector('.why-more')?.textContent).toMatch(/^; Humidity/);
   });

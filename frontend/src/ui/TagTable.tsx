@@ -23,10 +23,14 @@ import { selectClockFault, selectHasTime, selectTags } from '../store/moment';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Icon } from '../widgets/controls';
+import { useMedia } from '../widgets/useMedia';
 import { HealthMark } from './HealthMark';
 import { SensorLabel } from './SensorPicker';
 import { TagRow } from './TagRow';
 import { partsOf, SHORT_TABLE, useChosenInSight, useHeldRows, useVisibleRows } from './visibleRows';
+
+/** Too narrow for other columns than that of the chosen sensor (table-sizes.css). */
+const narrow = window.matchMedia('(max-width: 37.4375em)');
 
 /** All tags, including those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
@@ -49,10 +53,12 @@ export function TagTable(): JSX.Element {
   const then = useApp((state) => selectHourAgo(state, last));
   // One object for all rows, or each state would render them anew.
   const isTimed = useApp((state) => selectClockFault(state) === null);
-  const look = useMemo(
-    () => ({ catalogue, sensors, chosen, hidden, then, isTimed }),
-    [catalogue, sensors, chosen, hidden, then, isTimed],
-  );
+  const isNarrow = useMedia(narrow);
+  const look = useMemo(() => {
+    const names = sensors.map(({ name }) => name);
+    const beside = isNarrow ? names.filter((name) => name === chosen) : names;
+    return { catalogue, sensors, beside, chosen, hidden, then, isTimed };
+  }, [catalogue, sensors, isNarrow, chosen, hidden, then, isTimed]);
   const hasTime = useApp(selectHasTime);
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);

@@ -94,7 +94,10 @@ export interface Room {
   /** The visible part; labels of pins inside it are not cut off. */
   readonly within: Box;
   readonly covered: readonly Box[];
-  /** The robot's and other marks: labels keep clear of them, but a pin below one still has its label. */
+  /**
+   * The robot's and other marks: labels keep clear of them, but a pin below one still has its label, and
+   * a warning's value is worth more than a mark.
+   */
   readonly marks?: readonly Box[];
 }
 
@@ -124,7 +127,7 @@ export function placeLabels(
   return ordered.flatMap(({ request, pin }) => {
     // Among overlapping pins only warnings get labels: more would be unreadable.
     if (request.priority < URGENT && !taken.isFree(pin, [pin, ...marks])) return [];
-    const spot = firstFree(request, height, taken, room?.within ?? null);
+    const spot = firstFree(request, height, taken, room?.within ?? null, marks);
     if (!spot) return [];
     const { text, box, width } = spot;
     taken.add(box);
@@ -134,10 +137,11 @@ export function placeLabels(
 }
 
 function firstFree(
-  { x, y, radius, texts }: LabelRequest,
+  { x, y, radius, priority, texts }: LabelRequest,
   height: number,
   taken: Buckets,
   sight: Box | null,
+  marks: readonly Box[],
 ): { text: string; width: number; box: Box } | null {
   const reach = radius + GAP;
   // From a round pin to a corner of its label.
@@ -154,10 +158,13 @@ function firstFree(
       [x - near - width, y - near - height],
       [x - near - width, y + near],
     ];
-    for (const [left, top] of corners) {
-      const box = { left, top, right: left + width, bottom: top + height };
-      if ((!within || contains(within, box)) && taken.isFree(box)) return { text, width, box };
-    }
+    const boxes = corners
+      .map(([left, top]) => ({ left, top, right: left + width, bottom: top + height }))
+      .filter((box) => !within || contains(within, box));
+    const box =
+      boxes.find((each) => taken.isFree(each)) ??
+      (priority < URGENT ? undefined : boxes.find((each) => taken.isFree(each, marks)));
+    if (box) return { text, width, box };
   }
   return null;
 }

@@ -192,6 +192,22 @@ function TagChoice({
         value={sensor.name}
         onChange={(name) => act({ sensor: name })}
       />
+      {tagIds.length < MOST_CHARTED && others.length > 0 && (
+        <select
+          aria-label={S.chartAddTag}
+          value=""
+          onChange={(event) => choose([...tagIds, event.target.value])}
+        >
+          <option value="" disabled>
+            {S.chartAddTag}
+          </option>
+          {others.map(({ id }) => (
+            <option key={id} value={id}>
+              {tagLabel(id)}
+            </option>
+          ))}
+        </select>
+      )}
       <ul aria-label={S.tags}>
         {tagIds.map((tagId, look) => (
           <li key={tagId}>
@@ -218,22 +234,6 @@ function TagChoice({
           </li>
         ))}
       </ul>
-      {tagIds.length < MOST_CHARTED && others.length > 0 && (
-        <select
-          aria-label={S.chartAddTag}
-          value=""
-          onChange={(event) => choose([...tagIds, event.target.value])}
-        >
-          <option value="" disabled>
-            {S.chartAddTag}
-          </option>
-          {others.map(({ id }) => (
-            <option key={id} value={id}>
-              {tagLabel(id)}
-            </option>
-          ))}
-        </select>
-      )}
     </div>
   );
 }

@@ -146,7 +146,7 @@ describe('lines are fetched again', () => {
     show();
     await passed(100);
     await passed(64_000);
-    expect(histories()).toHaveLength(1 + 4);
+    expect(histories()).toHaveLength(1 + 2);
   });
 
   test('after a reconnect, and what is there stays meanwhile', async () => {

@@ -39,7 +39,7 @@ describe('what is asked', () => {
     const next = requestedSpan({ kind: 'hour' }, 1_000_009);
     expect(first).toEqual({ from: 996_420, to: 1_000_020 });
     expect(next).toEqual(first);
-    expect(requestedSpan({ kind: 'hour' }, 1_000_021)).toEqual({ from: 996_440, to: 1_000_040 });
+    expect(requestedSpan({ kind: 'hour' }, 1_000_021)).toEqual({ from: 996_450, to: 1_000_050 });
   });
 
   test('is all there is, or exactly what was chosen', () => {
@@ -48,9 +48,10 @@ describe('what is asked', () => {
   });
 
   test('is asked again once a bucket, and at least every half minute; not of what is over', () => {
-    const turns = (kind: 'hour' | 'day' | 'all'): number =>
-      new Set(Array.from({ length: 600 }, (_, s) => turnOf({ kind }, 1e9 + s))).size;
-    expect([turns('hour'), turns('day'), turns('all')]).toEqual([30, 21, 21]);
+    const turns = (period: Parameters<typeof turnOf>[0]): number =>
+      new Set(Array.from({ length: 600 }, (_, s) => turnOf(period, 1e9 + s))).size;
+    const short = { kind: 'own', from: 1e9 - 600, to: 1e9 + 600 } as const;
+    expect([turns(short), turns({ kind: 'day' }), turns({ kind: 'all' })]).toEqual([60, 21, 21]);
     expect(turnOf({ kind: 'own', from: 3, to: 10 }, 50)).toBe(0);
     expect(turnOf({ kind: 'own', from: 3, to: 1e9 }, 50)).not.toBe(0);
   });

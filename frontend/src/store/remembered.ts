@@ -8,8 +8,8 @@ import { failed, NOTHING, ready } from './fetcher';
 import { rosNow, selectLatest } from './moment';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
-/** A bucket is nearly two pixels wide on a phone, and a few on the widest bar. */
-const BUCKETS = 180;
+/** A bucket is three pixels wide on a phone, and a few more on the widest bar. */
+const BUCKETS = 120;
 const INTERVAL_MS = 1_000;
 /** Refetched once per bucket, within these bounds, seconds. */
 const SOONEST_S = 5;

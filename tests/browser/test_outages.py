@@ -96,7 +96,7 @@ def test_a_server_that_is_killed_and_restarts_with_other_tags(
         peer.observe(scan("a", {"humidity": 61.0}))
         hmi.expect_rows("a")
         expect_live(hmi)
-        expect(hmi.cell("a", "temperature")).to_contain_text("no sensor")
+        expect(hmi.cell("a", "temperature")).to_contain_text("No sensor")
         expect(hmi.cell("a", "humidity")).to_have_text("61.0")
         # No heat map of the old greenhouse, and not its map either.
         expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")

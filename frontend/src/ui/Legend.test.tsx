@@ -176,9 +176,9 @@ describe('legend', () => {
       'Stressed',
       'Unknown',
       'Healthy',
-      'no sensor',
-      'sensor failed',
-      'pest seen',
+      'No sensor',
+      'Sensor failed',
+      'Pest seen',
     ]);
     // The same marks as on the map.
     expect(keys[0]?.querySelector('[data-health=critical] .body')).not.toBeNull();

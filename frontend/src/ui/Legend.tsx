@@ -254,17 +254,20 @@ export function HeatControl(): JSX.Element {
 function ColouringControl(): JSX.Element {
   const colouring = useApp((state) => state.view.colouring);
   return (
-    <Segmented
-      legend={S.colouring}
-      className="colouring"
-      value={colouring}
-      options={(['ideal', 'value'] as const).map((value) => ({
-        value,
-        label: S.colourings[value],
-      }))}
-      onChange={(chosen) => {
-        act({ colouring: chosen });
-      }}
-    />
+    <>
+      <span aria-hidden="true">{S.colouring}</span>
+      <Segmented
+        legend={S.colouring}
+        className="colouring"
+        value={colouring}
+        options={(['ideal', 'value'] as const).map((value) => ({
+          value,
+          label: S.colourings[value],
+        }))}
+        onChange={(chosen) => {
+          act({ colouring: chosen });
+        }}
+      />
+    </>
   );
 }

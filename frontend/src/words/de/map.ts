@@ -67,7 +67,7 @@ export const MAP: In<typeof EN.MAP> = {
   valueRange: (low, high) => `${low}\u00a0bis\u00a0${high}`,
   legendEach: (part) => `${part} je Art`,
   legendOthers: 'andere',
-  pinLacking: 'kein Sensor',
+  pinLacking: 'Kein Sensor',
   pinFailed: 'Sensor ausgefallen',
   pinPest: 'Schädlinge gefunden',
   rangeKeep: 'Bereich beibehalten',

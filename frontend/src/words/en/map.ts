@@ -63,9 +63,9 @@ export const MAP = {
   valueRange: (low: string, high: string): string => `${low}\u00a0to\u00a0${high}`,
   legendEach: (part: string): string => `${part} per species`,
   legendOthers: 'others',
-  pinLacking: 'no sensor',
-  pinFailed: 'sensor failed',
-  pinPest: 'pest seen',
+  pinLacking: 'No sensor',
+  pinFailed: 'Sensor failed',
+  pinPest: 'Pest seen',
   rangeKeep: 'Keep this range',
   fieldFailed: (reason: string): string =>
     `The heat map could not be loaded (${reason}); the page keeps trying.`,

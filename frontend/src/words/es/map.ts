@@ -66,9 +66,9 @@ export const MAP: In<typeof EN.MAP> = {
   valueRange: (low, high) => `${low}\u00a0a\u00a0${high}`,
   legendEach: (part) => `${part} por especie`,
   legendOthers: 'otras',
-  pinLacking: 'sin sensor',
-  pinFailed: 'sensor averiado',
-  pinPest: 'plaga detectada',
+  pinLacking: 'Sin sensor',
+  pinFailed: 'Sensor averiado',
+  pinPest: 'Plaga detectada',
   rangeKeep: 'Mantener el rango',
   fieldFailed: (reason) =>
     `No se pudo cargar el mapa de calor (${reason}); la página lo sigue intentando.`,

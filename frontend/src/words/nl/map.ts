@@ -65,9 +65,9 @@ export const MAP: In<typeof EN.MAP> = {
   valueRange: (low, high) => `${low}\u00a0tot\u00a0${high}`,
   legendEach: (part) => `${part} per soort`,
   legendOthers: 'andere',
-  pinLacking: 'geen sensor',
-  pinFailed: 'sensor uitgevallen',
-  pinPest: 'plaag gezien',
+  pinLacking: 'Geen sensor',
+  pinFailed: 'Sensor uitgevallen',
+  pinPest: 'Plaag gezien',
   rangeKeep: 'Bereik vasthouden',
   fieldFailed: (reason) =>
     `De heatmap kon niet worden geladen (${reason}); de pagina blijft het proberen.`,

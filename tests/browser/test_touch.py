@@ -139,9 +139,18 @@ def test_charts_are_whole_and_have_one_line_of_tools_and_the_whole_width(phone: 
     phone.turn("chart.sensor=1&chart.sensor=10&sensor=dew_point")
     expect(phone.page.locator(".chart-tags li")).to_have_count(2)
     expect(phone.page.locator(".u-over")).to_be_visible()
-    tools, inside = places(phone, ".chart-tags", ".u-over")
-    assert tools.bottom - tools.top < 60
+    # Another tag can be chosen without scrolling, above the line of those in the chart.
+    add, tags, inside = places(
+        phone, ".chart-tags > select:last-of-type", ".chart-tags ul", ".u-over"
+    )
+    assert add.right < PHONE["width"] and add.bottom < tags.top
+    assert tags.bottom - tags.top < 40
     assert inside.right > PHONE["width"] - 30
+    # Names of limits are inside a narrow plot.
+    phone.turn("chart.tag=1&tag=1")
+    expect(phone.page.locator(".chart-tags")).to_have_count(0)
+    expect(plots.first.locator(".u-over")).to_be_visible()
+    assert place(plots.first.locator(".u-over")).right > PHONE["width"] - 30
 
 
 def test_one_finger_moves_the_map_and_two_zoom_about_their_middle(phone: Hmi) -> None:

@@ -101,6 +101,13 @@ describe('pins', () => {
     expect(sign('lacking')).toEqual(sign('value'));
   });
 
+  test('a healthy one without the sensor in view is smaller; a warning never is', () => {
+    const size = (over: Partial<Pin>): unknown =>
+      draw([pin({ kind: 'lacking', ...over })]).sprites[0]?.named('scale')[0]?.args[0];
+    expect([size({}), size({ kind: 'value' })]).toEqual([9, 11]);
+    expect(size({ verdict: 'critical' })).toBe(12);
+  });
+
   test('who needs somebody lies on top, whatever the order', () => {
     const order = (...verdicts: Verdict[]): unknown[] =>
       draw(verdicts.map((verdict, id) => pin({ id: String(id), verdict, strength: 1 - id / 10 })))
@@ -179,11 +186,11 @@ test('labels are copied relative to the map’s origin', () => {
 });
 
 test('pins and blooms shrink with the map, within limits', () => {
-  expect(pinRadius(1)).toBe(6);
+  expect(pinRadius(1)).toBe(5);
   expect(pinRadius(5000)).toBe(11);
   // If they are crowded, the heat map shows between them.
   expect(pinRadius(5, 2)).toBe(2);
-  expect(pinRadius(20, 2)).toBe(6);
+  expect(pinRadius(20, 2)).toBe(5);
   expect(bloomRadius(1)).toBe(1.5);
   expect(bloomRadius(5000)).toBe(6);
 });

@@ -19,7 +19,7 @@ const LABEL_PADDING = 5;
  * the heat map shows between them.
  */
 export function pinRadius(scale: number, spacing = Infinity): number {
-  const usual = Math.round(Math.min(11, Math.max(6, scale * 0.11)));
+  const usual = Math.round(Math.min(11, Math.max(5, scale * 0.11)));
   return Math.min(usual, Math.max(LEAST_PX.healthy, Math.round(scale * spacing * 0.22)));
 }
 
@@ -94,10 +94,13 @@ export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void 
   const isTooDense = view.scale * spacing < LEAST_SPACING_PX;
   for (const verdict of BY_SEVERITY) {
     if (isTooDense && verdict === 'healthy') continue;
-    const radius = Math.max(usual, LEAST_PX[verdict]);
-    const box = (radius + WARNING_PX + 4) * 2;
+    const size = Math.max(usual, LEAST_PX[verdict]);
+    const box = (size + WARNING_PX + 4) * 2;
     for (const pin of pins) {
       if (pin.verdict !== verdict) continue;
+      // Without the sensor in view, a healthy tag has little to say here.
+      const isQuiet = pin.kind === 'lacking' && verdict === 'healthy';
+      const radius = isQuiet ? Math.round(size * 0.8) : size;
       const { x, y } = toCanvas(view, pin.at);
       if (!inside(pen, x, y, box)) continue;
       const key = `pin ${radius} ${verdict} ${pin.kind}`;
@@ -147,7 +150,8 @@ function paintPin(
   context.fill(outline);
   context.strokeStyle = colour(isLine ? verdict : 'pin-line');
   context.lineWidth = isLine ? Math.min(2 / radius, 0.4) : 1.25 / radius;
-  if (kind === 'lacking') context.setLineDash([3 / radius, 3 / radius]);
+  // A small circle would be corners.
+  if (kind === 'lacking' && radius >= LEAST_SIGN_PX) context.setLineDash([3 / radius, 3 / radius]);
   context.stroke(outline);
   context.setLineDash([]);
   // Too small for a sign: a dot.

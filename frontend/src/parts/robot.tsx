@@ -156,7 +156,7 @@ function useTrail(): readonly Point[] {
   const [trail, setTrail] = useState<readonly Point[]>([]);
   useEffect(() => {
     const stop = keepFetched<Robot>(
-      { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail) },
+      { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail.slice(-TRAIL_POINTS)) },
       ({ twin }) =>
         twin.connection.socket.kind === 'open'
           ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
@@ -176,8 +176,8 @@ function useTrail(): readonly Point[] {
 
 type Point = Robot['trail'][number];
 
-/** Age of the oldest point, s. */
-const TRAIL_S = 3_600;
+/** About the last round: an hour of them would cover the heat map. */
+const TRAIL_POINTS = 50;
 /** Least distance between two points, as in the bridge, m. */
 const STEP_M = 0.1;
 /** The way between points farther apart is unknown, m. */
@@ -188,7 +188,7 @@ export function extended(trail: readonly Point[], next: Point): readonly Point[]
   const last = trail.at(-1);
   const ageOfPoint = (it: Point): number => secondsOf(next.observed_at) - secondsOf(it.observed_at);
   if (last && ageOfPoint(last) >= 0 && apart(last, next) < STEP_M) return trail;
-  return [...trail.filter((it) => ageOfPoint(it) >= 0 && ageOfPoint(it) <= TRAIL_S), next];
+  return [...trail.filter((it) => ageOfPoint(it) >= 0), next].slice(-TRAIL_POINTS);
 }
 
 /** The trail as an SVG path in metres, with a break where the way is unknown. */

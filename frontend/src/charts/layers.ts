@@ -14,8 +14,6 @@ export interface Frame {
   readonly x: (at: number) => number;
   /** Position of a value in the sensor's own unit. */
   readonly y: (value: number) => number;
-  /** Whether there is room for the names of limits right of the plot. */
-  readonly hasSide: boolean;
   readonly model: PlotModel;
   readonly colour: Colours;
 }
@@ -148,29 +146,27 @@ const NAME_HEIGHT = 15;
 const NAME_GAP = 6;
 
 /**
- * Each limit's name at its line, with an arrow if the line lies above or below the picture: right of the
- * plot, or inside it above the line, where the readings are oldest.
+ * Each limit's name above its line, over the oldest readings, with an arrow if the line lies above or
+ * below the picture.
  */
-function drawNames({ context, box, ratio, y, hasSide, model, colour }: Frame): void {
+function drawNames({ context, box, ratio, y, model, colour }: Frame): void {
   const height = NAME_HEIGHT * ratio;
   const names = limitsOf(model).sort((a, b) => b.value - a.value);
   context.font = `${fontPx() * ratio}px ${colour('font')}`;
   context.textAlign = 'left';
-  context.textBaseline = 'middle';
+  context.textBaseline = 'bottom';
   context.lineWidth = 4 * ratio;
   context.strokeStyle = colour('chart-surface');
-  const left = box.left + (hasSide ? box.width : 0) + NAME_GAP * ratio;
-  const above = hasSide ? 0 : height / 2;
-  let least = box.top + above;
+  let least = box.top + height;
   names.forEach(({ kind, value, side }, index) => {
-    const most = box.top + box.height - above - (names.length - 1 - index) * height;
-    const at = Math.max(least, Math.min(y(value) - above, most));
+    const most = box.top + box.height - (names.length - 1 - index) * height;
+    const at = Math.max(least, Math.min(y(value), most));
     least = at + height;
     const word = kind === 'ideal' ? S.idealParts.any : S.alarmStatus.critical;
     const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value)}`;
+    context.strokeText(text, box.left + NAME_GAP * ratio, at);
     context.fillStyle = kind === 'ideal' ? colour('chart-text') : colour('chart-failure');
-    if (!hasSide) context.strokeText(text, left, at);
-    context.fillText(text, left, at);
+    context.fillText(text, box.left + NAME_GAP * ratio, at);
   });
 }
 

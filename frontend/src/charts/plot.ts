@@ -18,7 +18,7 @@ import {
   lookOf,
   MARKS_LANE,
 } from './layers';
-import { aligned, drawnOf, hasMarks, limitsOf, valueRange, type PlotModel } from './model';
+import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
 
 export interface PlotHandlers {
   /** The time under the mouse, ROS seconds; null: none. */
@@ -34,9 +34,6 @@ const NO_TIMES_HEIGHT = 8;
 const DASH_BEFORE = [3, 3];
 /** A shorter drag is a click, CSS pixels. */
 const SHORTEST_DRAG = 6;
-/** Room for the names of limits right of the plot, in font sizes; a narrow chart has them inside. */
-const LIMITS_ROOM = 8;
-const NARROW = 40;
 /** Room right of the plot for half of the last time below it, in font sizes. */
 const HALF_A_TIME = 2;
 /** All charts share one cursor. */
@@ -63,15 +60,9 @@ function build(
     ratio: uPlot.pxRatio,
     x: (at) => u.valToPos(at, 'x', true),
     y: (value) => u.valToPos(toShown(latest.current.sensor, value), 'y', true),
-    hasSide: hasSide(u),
     model: latest.current,
     colour,
   });
-
-  // A single line always has room for names, so that stacked charts align in time.
-  const hasSide = ({ width }: uPlot): boolean =>
-    width >= NARROW * fontPx() &&
-    (latest.current.lines.length === 1 || limitsOf(latest.current).length > 0);
 
   const axis = (): Partial<uPlot.Axis> => ({
     stroke: () => colour('chart-text'),
@@ -101,7 +92,7 @@ function build(
       ...{ width: 300, height: 150 },
       class: 'plot',
       legend: { show: false },
-      padding: [8, (u) => (hasSide(u) ? LIMITS_ROOM : HALF_A_TIME) * fontPx(), 0, 0],
+      padding: [8, HALF_A_TIME * fontPx(), 0, 0],
       cursor: {
         y: false,
         dataIdx: heldIndex,

@@ -181,6 +181,8 @@ def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phon
     expect(phone.row("1")).to_be_hidden()
     show(phone, "Tags")
     phone.expect_rows(*TAGS)
+    # A value whose column is hidden stays in the reason.
+    expect(phone.row("10").locator(".why")).to_contain_text(re.compile(r"Humidity 40\.0.*above 26"))
     for pane in ("Tags", "Map"):
         show(phone, pane)
         assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]

@@ -250,9 +250,8 @@ describe('a reason in words', () => {
       reason({ sensor: 'humidity', value: 97, limit: 85 }),
       reason({ sensor: 'vpd', value: 0.11, limit: 0.2 }),
     ];
-    expect(causeText(CATALOGUE, damp, null, true, beside)).toBe(
-      `Air too damp: Humidity, VPD 0.11${NBSP}kPa`,
-    );
+    expect(causeText(CATALOGUE, damp, null, true, beside)).toBe(`Air too damp: VPD 0.11${NBSP}kPa`);
+    expect(causeText(CATALOGUE, damp, null, true, ['humidity', 'vpd'])).toBe('Air too damp');
   });
 
   test('a healthy value waits for a scan; pests, for another inspection', () => {

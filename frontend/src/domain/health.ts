@@ -270,7 +270,10 @@ export function causeText(
     return reasonsText(sensors, reasons, age, isMarked, beside);
   }
   const ago = age === null ? '' : ` (${S.agoSuffix(ageText(age))})`;
-  return `${S.alarmWhat(S.airCause[air], valuesText(sensors, reasons, isMarked, beside))}${ago}`;
+  const others = reasons.filter(({ sensor }) => !beside.includes(sensor));
+  const cause = S.airCause[air];
+  if (others.length === 0) return cause;
+  return `${S.alarmWhat(cause, valuesText(sensors, others, isMarked))}${ago}`;
 }
 
 /** Sensors with their values, if there are any, in one line. */
@@ -278,12 +281,11 @@ export function valuesText(
   sensors: Catalogue,
   reasons: readonly HealthReason[],
   isMarked = false,
-  beside: readonly string[] = [],
 ): string {
   const texts = reasons.map(({ sensor: name, value, verdict }) => {
     const sensor = sensors.named(name);
-    const isValued = value !== null && !beside.includes(name);
-    const text = isValued ? `${nameOf(sensor)} ${readingText(sensor, value)}` : nameOf(sensor);
+    const text =
+      value === null ? nameOf(sensor) : `${nameOf(sensor)} ${readingText(sensor, value)}`;
     return isMarked ? text : ratedText(text, verdict);
   });
   return [...new Set(texts)].join(', ');

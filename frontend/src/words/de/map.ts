@@ -209,7 +209,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartWhole: 'Ganzer Zeitraum',
   chartCsvShown: 'CSV der Anzeige',
   chartCsvAll: 'CSV aller Messwerte',
-  chartAddTag: 'Messpunkt hinzufügen',
+  chartAddTag: '+ Messpunkt',
   chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
   chartWhich: 'Tabelle von',
   chartHint: 'Ziehen zum Vergrößern; klicken, um zu dieser Zeit zu springen.',

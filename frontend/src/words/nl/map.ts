@@ -207,7 +207,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartWhole: 'Hele periode',
   chartCsvShown: 'CSV van de weergave',
   chartCsvAll: 'CSV van alle meetwaarden',
-  chartAddTag: 'Meetpunt toevoegen',
+  chartAddTag: '+ Meetpunt',
   chartRemoveTag: (tag) => `Meetpunt ${tag} uit de grafiek halen`,
   chartWhich: 'Tabel van',
   chartHint: 'Sleep om in te zoomen; klik om naar dat moment te gaan.',

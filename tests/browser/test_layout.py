@@ -330,10 +330,10 @@ def test_the_labels_of_the_ideal_range_are_below_its_bracket(open_at: Callable[.
 
 
 def test_many_sensors_leave_the_reasons_their_room(running: Bridge, open_page: OpenPage) -> None:
-    more = {f"sensor{number}": 1.0 for number in range(5)}
+    more = {f"leaf_temperature{number}": 1.0 for number in range(5)}
     running.peer.observe(scan("1", {"temperature": 45.0, "humidity": 60.0, **more}, at=(0, 0)))
     hmi = open_page(running.url)
-    expect(hmi.cell("1", "sensor4")).to_be_attached()
+    expect(hmi.cell("1", "leaf_temperature4")).to_be_attached()
     cell = hmi.row("1").locator(".cell-health")
     hmi.expect(lambda: cell.evaluate("e => e.clientWidth") > 130, "room for the reasons")
     # They have two lines: the status is its shape, and a word for screen readers.
@@ -341,7 +341,7 @@ def test_many_sensors_leave_the_reasons_their_room(running: Bridge, open_page: O
     hmi.expect(lambda: word.evaluate("e => e.clientWidth") == 1, "no word")
     # Beside a narrow table's chosen sensor, too, which is in sight although the table is wider.
     hmi.resize(1024, 768)
-    hmi.turn("sensor=sensor4")
+    hmi.turn("sensor=leaf_temperature4")
     hmi.expect(lambda: cell.evaluate("e => e.clientWidth") > 120, "room for the reasons")
     running.peer.observe(scan("2", {"temperature": 45.0}, at=(1, 0)))
     why = hmi.row("2").locator(".why", has_text="Temperature")

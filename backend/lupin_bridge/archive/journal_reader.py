@@ -23,6 +23,7 @@ from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.follow import rows_behind
 from lupin_twin.journal.paths import files_of, forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
+from lupin_twin.journal.rows import noted_number
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     MAP,
@@ -201,7 +202,7 @@ class Source:
 
         Rows that were deleted here stay there, except those that were never forwarded.
         """
-        purged = int(self.log.meta(PURGED_SEQ) or 0)
+        purged = noted_number(self.log, PURGED_SEQ)
         of_runs = ("lost_ns", "purged_ns") if purged > epoch.forwarded_seq else ("lost_ns",)
         for site, key, value in self.log.execute("SELECT * FROM meta WHERE site = :site"):
             name, _, number = key.partition(":")

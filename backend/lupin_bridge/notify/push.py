@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from ipaddress import ip_address
+from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
 from socket import SOCK_STREAM
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
@@ -58,6 +58,8 @@ AT_ONCE: Final = 8
 # Threads of its own that look up names, more than an account has devices: a name server that never
 # answers blocks one for half a minute.
 LOOKUPS: Final = 32
+# A gateway translates these to the IPv4 address in their last four bytes (NAT64, RFC 6052).
+_NAT64: Final = ip_network("64:ff9b::/96")
 _GONE: Final = (404, 410)
 _KEY: Final = "vapid"
 
@@ -257,8 +259,7 @@ class Push:
             raise PostError("its host is not known") from None
         addresses = [str(address[0]) for *_, address in found]
         for address in addresses:
-            is_public = ip_address(address.partition("%")[0]).is_global
-            if not is_public and endpoint.host not in self.target.private_hosts:
+            if not is_public(address) and endpoint.host not in self.target.private_hosts:
                 raise DeviceRefused(
                     f"{address} of {endpoint.host} is not a public address, see --push-private-host"
                 )
@@ -294,6 +295,20 @@ def parsed(url: str, target: PushTarget) -> Endpoint:
     return Endpoint(host, port, path_of(parts), parts.netloc, target.tls)
 
 
+def is_public(host: str) -> bool:
+    """Whether an address is reached over the internet alone; one with an IPv4 address leads there.
+
+    Raises:
+        ValueError: it is a name.
+
+    """
+    found = ip_address(host.partition("%")[0])
+    if isinstance(found, IPv6Address):
+        inner = IPv4Address(found.packed[-4:]) if found in _NAT64 else found.sixtofour
+        found = inner or found
+    return found.is_global
+
+
 def check_device(device: Device, target: PushTarget) -> None:
     """Refuse a device that can never be notified.
 
@@ -306,10 +321,10 @@ def check_device(device: Device, target: PushTarget) -> None:
     endpoint = parsed(device.endpoint, target)
     if endpoint.host not in target.private_hosts:
         try:
-            is_public = ip_address(endpoint.host).is_global
+            is_reached = is_public(endpoint.host)
         except ValueError:  # a name, whose address is checked at each post
-            is_public = "." in endpoint.host
-        if not is_public:
+            is_reached = "." in endpoint.host
+        if not is_reached:
             raise DeviceRefused("endpoint: expected a host that is reached over the internet")
     try:
         EllipticCurvePublicKey.from_encoded_point(SECP256R1(), decoded(device.public_key))

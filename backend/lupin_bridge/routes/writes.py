@@ -208,7 +208,7 @@ def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) ->
         raise Refused("until is missing, expected a moment, or null to unshelve")
     if draft.until is None:
         return None
-    until_ns = moment("until", draft.until)
+    until_ns = _given_ns("until", draft.until)
     left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
     if draft.kind == COMMENT:
         if left_s > _SLACK_S:
@@ -320,11 +320,14 @@ async def post_observation(request: Request) -> Response:
     return json_response(orjson.dumps(body), 202)
 
 
+def _given_ns(name: str, given: str | float) -> int:
+    return moment(name, given if isinstance(given, str) else f"{given:.6f}")
+
+
 def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
     if observed_at is None:
         return now_ns
-    text = observed_at if isinstance(observed_at, str) else f"{observed_at:.6f}"
-    stamp_ns = moment("observed_at", text)
+    stamp_ns = _given_ns("observed_at", observed_at)
     ahead_s = (stamp_ns - now_ns) / NANOSECONDS_PER_SECOND
     if ahead_s > MAX_AHEAD_S:
         raise Refused(

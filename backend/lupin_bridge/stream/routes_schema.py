@@ -66,11 +66,10 @@ class NoteDraft(_Given):
         max_length=300, description="`alarm:` and its id, `tag:` and its id, or `site`"
     )
     text: _Text = Field(default="", description=f"at most {MAX_TEXT} characters")
-    until: str | None = Field(
+    until: str | float | None = Field(
         default=None,
-        max_length=64,
-        description="a moment, in the form of `at`. For shelve: its end; null: unshelve. For "
-        "comment: the moment that it is about; null: now",
+        description="ISO 8601 or ROS seconds, as for `at`. For shelve: its end; null: unshelve. "
+        "For comment: the moment that it is about; null: now",
     )
 
 

@@ -84,7 +84,7 @@ export function TagTable(): JSX.Element {
     <table
       className={lines.length > SHORT_TABLE ? 'tags long' : 'tags'}
       data-testid="tag-table"
-      style={{ '--sensors': sensors.length } as CSSProperties}
+      style={{ '--sensors': sensors.reduce((sum, it) => sum + share(it), 0) } as CSSProperties}
       aria-rowcount={lines.length + 1}
       onFocus={(event) => setFocused(rowTag(event))}
       onBlur={({ currentTarget, relatedTarget }) => {
@@ -114,7 +114,7 @@ export function TagTable(): JSX.Element {
           <col
             key={sensor.name}
             className={sensor.name === chosen ? 'col-sensor' : 'col-sensor other'}
-            style={letters(longestWord(S.sensorShort(sensor.label)))}
+            style={letters(longestWord(sensor))}
           />
         ))}
         {has('species') && <col className="col-species" />}
@@ -237,13 +237,16 @@ const letters = (count: number): CSSProperties => ({ '--letters': count }) as CS
 
 const speciesLength = (species: string): number => speciesText(species, 28).length;
 
-/** Length of a label's longest word, in characters. */
-const longestWord = (label: string): number =>
+/** Length of the longest word of a sensor's heading, in characters. */
+const longestWord = ({ label }: Sensor): number =>
   Math.max(
-    ...shown(label, 24)
+    ...shown(S.sensorShort(label), 24)
       .split(/[\s-]/)
       .map((word) => word.length),
   );
+
+/** Width of a sensor's column, as a multiple of the usual one, which holds a word of 9 letters. */
+const share = (sensor: Sensor): number => Math.max(1, longestWord(sensor) / 9);
 
 const SensorHead = memo(function SensorHead({
   sensor,

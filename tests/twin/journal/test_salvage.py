@@ -12,8 +12,10 @@ from typing import Any
 import pytest
 
 from lupin_twin.core.state import Write
+from lupin_twin.journal.appending import Appender, simulated
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.retention import kept
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer
 from tests.support.journal import (
@@ -139,6 +141,26 @@ def test_an_invalid_row_is_left_out(whole: Path, damaged: Path, text: bytes) -> 
     content[content.rindex(text, 0, at + 12)] ^= 0x20
     damaged.write_bytes(content)
     assert len(scans(whole) - scans(salvaged(damaged))) == 1
+
+
+@pytest.mark.parametrize(
+    "key", ["last_seq", "purged_seq", "purged_ns:1", "lost_ns:1", "simulated_from_ns"]
+)
+def test_a_fact_that_is_no_number_is_damage_and_is_left_out(
+    whole: Path, damaged: Path, key: str
+) -> None:
+    def read(path: Path) -> None:
+        with closing(open_writer(path)) as connection:
+            Appender(connection)
+            kept(connection)
+            simulated(connection)
+
+    changed(damaged, f"INSERT OR REPLACE INTO meta VALUES ('local', '{key}', '9x')")
+    with pytest.raises(DamagedFile, match=f"{key} in the journal is '9x', which is not a number"):
+        read(damaged)
+    new = salvaged(damaged)
+    read(new)
+    assert scans(new) == scans(whole)
 
 
 def test_new_numbers_are_beyond_all_that_may_be_lost(damaged: Path) -> None:
@@ -269,6 +291,7 @@ def test_an_interruption_is_no_damage(where: str, path: Path) -> None:
         ("UPDATE look SET run = 5", "look 2 of tag '7' is not what was written"),
         ("UPDATE place SET run = 5", "place 1 of tag '7' is not what was written"),
         ("UPDATE run SET joins = 3", "run 1 joins run 3, which is missing"),
+        ("INSERT INTO meta VALUES ('local', 'lost_ns:1', 'x')", "lost_ns:1 is 'x', which is not"),
     ],
 )
 def test_damage_is_reported_by_row(path: Path, sql: str, message: str) -> None:

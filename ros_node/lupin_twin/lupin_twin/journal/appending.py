@@ -21,12 +21,11 @@ from lupin_twin.core.history import KIND_FLOWER, KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.counts import count_rows
 from lupin_twin.journal.paths import Lock
-from lupin_twin.journal.rows import sensor_names, weight
+from lupin_twin.journal.rows import noted_number, sensor_names, weight
 from lupin_twin.journal.runs import Clock, Run, put_run
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
     SiteLog,
-    get_meta,
     insert_into,
     json_text,
     open_writer,
@@ -75,15 +74,15 @@ class Appender:
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
-        self._connection = connection
+        self._connection, log = connection, SiteLog(connection)
         newest = (
             f"SELECT coalesce(max(seq), 0) FROM {table} WHERE site = '{LOCAL_SITE}'"  # noqa: S608
             for table in ("scan", "look", "place")
         )
         self.last_seq: int = max(
-            int(get_meta(connection, PURGED_SEQ) or 0),
-            int(get_meta(connection, LAST_SEQ) or 0),
-            last_number(SiteLog(connection)),
+            noted_number(log, PURGED_SEQ),
+            noted_number(log, LAST_SEQ),
+            last_number(log),
             *(connection.execute(text).fetchone()[0] for text in newest),
             *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
         )
@@ -366,5 +365,5 @@ def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bo
 
 def simulated(connection: sqlite3.Connection) -> tuple[int, int] | None:
     """The period of a journal that was filled in, ns of ROS time; None if there is none."""
-    start_ns, end_ns = get_meta(connection, _FROM), get_meta(connection, _UNTIL)
-    return (int(start_ns), int(end_ns)) if start_ns and end_ns else None
+    start_ns, end_ns = (noted_number(SiteLog(connection), key) for key in (_FROM, _UNTIL))
+    return (start_ns, end_ns) if start_ns and end_ns else None

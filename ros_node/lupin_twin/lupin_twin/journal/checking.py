@@ -111,6 +111,11 @@ def _structure(connection: sqlite3.Connection) -> Iterator[str]:
         " AND b.run = a.joins WHERE a.joins IS NOT NULL AND b.run IS NULL"
     ).fetchall():
         yield f"run {number} joins run {joins}, which is missing"
+    for key, value in connection.execute(
+        "SELECT key, value FROM meta WHERE (key GLOB '*_seq' OR key GLOB '*_ns*')"
+        " AND value GLOB '*[^0-9]*'"
+    ).fetchall():
+        yield f"{key} is {value!r}, which is not a number"
 
 
 def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Iterator[str]:

@@ -21,7 +21,7 @@ from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, SILENCE_NS, Event, Grid, RunSpan, SeriesPast, grid
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal import sql
-from lupin_twin.journal.rows import numbers_of
+from lupin_twin.journal.rows import noted_number, numbers_of
 from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into
 
 # Followed by the number of a run: the last stamp of its deleted rows.
@@ -97,7 +97,7 @@ def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
 
 def deleted_ns(log: SiteLog, run: int) -> int:
     """The last stamp of a run's deleted rows; -1 if none was deleted."""
-    return int(log.meta(f"{DELETED}{run}") or -1)
+    return noted_number(log, f"{DELETED}{run}", -1)
 
 
 _SCANS: Final = (

@@ -17,7 +17,7 @@ from lupin_twin.core.past import DAY_NS, HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.counts import DELETED, FORGOTTEN, deleted_ns, extent
 from lupin_twin.journal.paths import writing_alone
-from lupin_twin.journal.rows import outermost
+from lupin_twin.journal.rows import noted_number, outermost
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -60,7 +60,7 @@ def used_bytes(connection: sqlite3.Connection) -> int:
 
 def note_lost(connection: sqlite3.Connection, run: int, at_ns: int) -> None:
     """Write that some of what a run received up to a moment was never written."""
-    before_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
+    before_ns = noted_number(SiteLog(connection), f"{_LOST}{run}", -1)
     set_meta(connection, f"{_LOST}{run}", max(at_ns, before_ns))
 
 
@@ -74,8 +74,8 @@ def kept(connection: sqlite3.Connection) -> Stretches:
     found: list[tuple[int, int]] = []
     for number, span in enumerate(spans(every)):
         run = span.run
-        lost_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
-        start_ns = max(span.start_ns, deleted_ns(SiteLog(connection), run) + 1, lost_ns + 1)
+        lost_ns = noted_number(log, f"{_LOST}{run}", -1)
+        start_ns = max(span.start_ns, deleted_ns(log, run) + 1, lost_ns + 1)
         if number == 0 and start_ns == 0:
             begun = [each.begun.stamp_ns for each in every if each.root == run]
             start_ns = min(*begun, *(extent(log, run) or begun))

@@ -6,6 +6,7 @@ import json
 import math
 import sqlite3
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any, Final
 
@@ -118,6 +119,20 @@ def _inspections(
 
 
 # --- texts of the tables as values ----------------------------------------------------------------
+
+
+def noted_number(log: SiteLog, key: str, otherwise: int = 0) -> int:
+    """A number that is noted about the journal as a whole; `otherwise` if none is.
+
+    Raises:
+        DamagedFile: something else is noted.
+
+    """
+    text = log.meta(key) or str(otherwise)
+    with suppress(ValueError):
+        if abs(found := int(text)) <= FOREVER_NS:
+            return found
+    raise DamagedFile(f"{key} in the journal is {text[:64]!r}, which is not a number")
 
 
 def numbers_of(texts: Sequence[str]) -> list[list[float]]:

@@ -327,7 +327,9 @@ def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> 
         if run != key and run.isdecimal() and str(value).isdecimal():
             # The whole hour is counted already.
             purged[int(run)] = (int(value) // HOUR_NS + 1) * HOUR_NS - 1
-        if key not in ("journal_id", SALVAGE, LAST_SEQ):
+        is_number = key == PURGED_SEQ or "_ns" in str(key)
+        is_sound = not is_number or str(value).isdecimal()
+        if is_sound and key not in ("journal_id", SALVAGE, LAST_SEQ):
             set_meta(new, key, value)
     # New numbers are past those of all rows that may have been lost at the end.
     set_meta(new, LAST_SEQ, largest + 1_000_000)

@@ -74,7 +74,7 @@ describe('follow', () => {
   test('its start is the moment of the observation that raised it, and no earlier', () => {
     const co2 = {
       ...alarm('a', { tag_id: '5', reason: { sensor: 'co2' } }),
-      raised_at: { sec: 9_000, nanosec: 1_200_001 },
+      raised_at: 9_000.0012,
     };
     act(withList('alarms'));
     goToStart(co2);

@@ -191,7 +191,7 @@ test('while a past moment is shown, new alarms are listed apart until acknowledg
   expect(now()).toEqual(['c', 'b']);
   acknowledgeAlarms([item('b')]);
   expect(now()).toEqual(['c']);
-  reportAlarms({ ...c, cleared_at: { sec: 990, nanosec: 0 } }, b, alarm('a'));
+  reportAlarms({ ...c, cleared_at: 990 }, b, alarm('a'));
   expect(now()).toEqual([]);
   reportAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
   expect(now()).toEqual(['d']);

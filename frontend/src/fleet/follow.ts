@@ -7,7 +7,7 @@ export interface Seen {
   readonly sites: Sites;
   /** null: nothing received yet. */
   readonly archive: Archive | null;
-  /** When data stopped arriving, ms since the epoch; null: they arrive. */
+  /** When data stopped arriving, seconds since the epoch; null: they arrive. */
   readonly lostAt: number | null;
 }
 
@@ -28,7 +28,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     onConnection: ({ socket }) => {
       // Nothing is lost before anything came; after sleep or a silence, the attempt may take long to fail.
       const isLost = socket.kind === 'closed' || (socket.kind === 'opening' && seen.archive);
-      if (isLost && seen.lostAt === null) update({ lostAt: epochOf(receivedAt) });
+      if (isLost && seen.lostAt === null) update({ lostAt: epochOf(receivedAt) / 1000 });
     },
     onFrame: (frame) => {
       receivedAt = now();

@@ -27,7 +27,7 @@ const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof w
   wireTag({
     tag_id: id,
     pose: { position: { x, y, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-    last_observed: { sec, nanosec: 0 },
+    last_observed: sec,
     readings: readings({ temperature: 20 }),
   });
 
@@ -279,7 +279,7 @@ describe('nothing is drawn anew but what changed', () => {
     start();
     const { snapshot } = store.get().twin.latest;
     const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));
-    const later = { sec: (snapshot?.at.sec ?? 0) + 1, revision: snapshot?.revision ?? '' };
+    const later = { sec: (snapshot?.at ?? 0) + 1, revision: snapshot?.revision ?? '' };
     receive(withState(stateFrame(tags, later), performance.now() + 1_000));
     expect(store.get().twin.latest.snapshot).not.toBe(snapshot);
     expect(frames).toEqual([]);

@@ -7,7 +7,7 @@ import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { extended, RobotFact, RobotLayer, robotText, trailPath } from './robot';
 
-const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
+const time = (sec: number): number => sec;
 const robot = {
   position: { x: 2.14, y: -3.4, heading: null, observed_at: time(988) },
   plan: null,

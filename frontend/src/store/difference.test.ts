@@ -4,7 +4,7 @@ import { snapshotOf } from '../domain/twin';
 import { timelineOf } from '../domain/timeline';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { npy, npyEstimate, npyField } from '../testing/field';
-import { wireStretch, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { act, receive, store } from './app';
 import { selectHeat, selectMapped } from './derived';
@@ -111,7 +111,7 @@ test('while the twin is silent, the shown state keeps its own time', async () =>
 test.each(['day', 'week'] as const)(
   'before all recorded data nothing is fetched of a %s ago',
   async (compare) => {
-    const reach = wireStretch(1_000, 2_000);
+    const reach = { from: 1_000, to: 2_000 };
     receive({ remembered: ready(timelineOf(wireTimeline({ from: 0, to: 2_000, reach }), 2_000)) });
     act({ compare });
     await settled();

@@ -2,7 +2,6 @@
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import { hourText, type TagThen } from '../domain/difference';
-import { secondsOf } from '../domain/time';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { keepFetched, store, type AppState } from './app';
 import { createStore } from './create';
@@ -41,7 +40,7 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
   const { snapshot } = selectLatest(state);
   if (!last || !snapshot) return null;
   // Valid for twice the TTL: the next answer is on its way.
-  const isNear = Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state);
+  const isNear = Math.abs(snapshot.at - last.of) <= 2 * SERVES * selectHourS(state);
   return isNear ? last : null;
 }
 

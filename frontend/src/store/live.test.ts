@@ -73,7 +73,7 @@ test('of many frames the newest is taken, a few times a second', () => {
 });
 
 test('deltas are put together; one that does not fit makes a new connection', () => {
-  const header = { stamp: { sec: 50, nanosec: 0 }, frame_id: 'map' };
+  const header = { stamp: 50, frame_id: 'map' };
   const delta = {
     type: 'delta',
     revision: 'd',

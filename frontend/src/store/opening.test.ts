@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { timelineOf } from '../domain/timeline';
-import { wireStretch, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
 import { fromFragment, toFragment } from './address';
@@ -14,7 +14,7 @@ const SHORT_S = 10_800;
 let stop: () => void;
 
 const remember = (seconds: number | null): void => {
-  const reach = seconds === null ? null : wireStretch(NOW - seconds, NOW);
+  const reach = seconds === null ? null : { from: NOW - seconds, to: NOW };
   const value = timelineOf(wireTimeline({ from: NOW - 86_400, to: NOW, reach }), NOW);
   receive({ remembered: { value, state: 'ready', message: '' } });
 };

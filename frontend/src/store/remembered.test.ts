@@ -2,7 +2,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { goLive, goLost, showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { wireStretch, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { fromFragment } from './address';
 import { requestedSpan, startOpening, startRemembered, turnOf } from './remembered';
@@ -78,7 +78,7 @@ test('a link that names no period brings back what the page opens on, at once', 
   const stopOpening = startOpening();
   const latest = stateFrame([wireTag()], { sec: 1_000_000, revision: 'r' });
   receive(withState(latest, performance.now()));
-  answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: wireStretch(0, 240) }));
+  answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: { from: 0, to: 240 } }));
   await pass(1_100);
   expect(store.get().view.period).toEqual({ kind: 'hour' });
   // Also twice, before any refetch.

@@ -182,7 +182,7 @@ test('a value that is too old says its age, and an attempt that of the last one'
   const cold = wireTag({ tag_id: '5', readings: readings({ temperature: 6.6 }, at) });
   const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
-  const attempt = { last_try: { sec: at + 2_340, nanosec: 0 }, last_try_status: 1 };
+  const attempt = { last_try: at + 2_340, last_try_status: 1 };
   const tags = [cold, wireTag({ tag_id: '6', ...attempt })];
   showTags(tags, judgement({ 5: [reason(), reason(old)], 6: [failed] }));
   reportAlarms(alarm('far', { tag_id: '6', reason: failed }));

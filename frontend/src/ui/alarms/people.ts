@@ -7,7 +7,6 @@ import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm, Session } from '../../contract/types';
 import { whenText } from '../../alarms/words';
 import { failureText } from '../../domain/format';
-import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
 import { keepFetched, onChange, store, useApp } from '../../store/app';
 import { rosNow, selectIsDisconnected } from '../../store/moment';
@@ -46,7 +45,7 @@ export function merged(
     const { id, acknowledged_at: at, shelved_by: by, reason } = alarm;
     const { verdict } = reason;
     const what = faultKey(alarm);
-    if (at) {
+    if (at != null) {
       isSame &&= acknowledged.has(id);
       if (!acknowledged.has(id)) acknowledged.set(id, { verdict, at: timeOfDay() });
     } else if (acknowledged.delete(id)) {
@@ -72,8 +71,8 @@ const alarmsNow = (): readonly Alarm[] => store.get().twin.alarms?.alarms ?? [];
 /** When a shelf ends by this browser's clock, ms since the epoch. */
 function endOf(alarm: Alarm): number | null {
   const nowS = rosNow(store.get(), now());
-  if (!alarm.shelved_until || nowS === null) return null;
-  return Math.floor(timeOfDay() + (secondsOf(alarm.shelved_until) - nowS) * 1000);
+  if (alarm.shelved_until == null || nowS === null) return null;
+  return Math.floor(timeOfDay() + (alarm.shelved_until - nowS) * 1000);
 }
 
 function take(): void {
@@ -182,6 +181,6 @@ export function sharingText(who: Session | null): string {
 export function useWhoAcknowledged(alarm: Alarm | null): string | null {
   const name = alarm?.acknowledged_by;
   const at = alarm?.acknowledged_at;
-  const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
+  const when = useTicking((tick) => (at == null ? '' : whenText(at, rosNow(store.get(), tick))));
   return name && when !== '' ? C.acknowledged(name, when) : null;
 }

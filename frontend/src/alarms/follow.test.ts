@@ -4,6 +4,7 @@ import { theMap, type MapActions } from '../map/commands';
 import { act, receive, store } from '../store/app';
 import { withState } from '../store/twin';
 import { withList, withTag } from '../store/view';
+import { started } from '../testing/life';
 import { alarm, reportAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
@@ -49,7 +50,7 @@ describe('follow', () => {
     showTags([]);
     const latest = stateFrame([wireTag()], { sec: 10_000 });
     receive(withState(latest, performance.now()));
-    stops = [startAlarms()];
+    stops = [started(startAlarms)];
     theMap.set({ show: (tagId) => void seen.push(tagId) } as MapActions);
   });
   afterEach(() => {

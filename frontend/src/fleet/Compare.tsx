@@ -155,10 +155,9 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite): string {
   return withUnit(sensor, differenceNumber(sensor, deviation));
 }
 
-function onSystemTheme(listener: () => void): () => void {
+function onSystemTheme(listener: () => void, signal: AbortSignal): void {
   const system = window.matchMedia('(prefers-color-scheme: dark)');
-  system.addEventListener('change', listener);
-  return () => system.removeEventListener('change', listener);
+  system.addEventListener('change', listener, { signal });
 }
 
 function Chart({

@@ -5,6 +5,7 @@ import { act, receive, store } from '../store/app';
 import { withField, withState } from '../store/twin';
 import { withLayer } from '../store/view';
 import { NOTHING } from '../store/fetcher';
+import { started } from '../testing/life';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -36,7 +37,7 @@ const start = (isFixed = false): void => {
   overlay = canvas();
   pins = canvas();
   still = canvas();
-  stop = runMap(element, { still, pins, overlay }, isFixed, fail);
+  stop = started((on) => runMap(element, { still, pins, overlay }, isFixed, fail, on));
   paint();
 };
 /** Runs the callbacks of the next frame. */
@@ -240,7 +241,7 @@ test('everything is in sight, the heat map too', () => {
 
 test('a map of another size is drawn at once, and not empty for a frame', () => {
   const still = document.createElement('canvas');
-  stop = runMap(element, { still, pins, overlay }, false, fail);
+  stop = started((on) => runMap(element, { still, pins, overlay }, false, fail, on));
   expect(FakeContext.recordOf(still)?.named('clearRect').length).toBeGreaterThan(0);
 });
 

@@ -6,7 +6,7 @@ import type { Alarm, Note } from '../contract/types';
 import { shown } from '../domain/text';
 import { rosText, type Span } from '../domain/time';
 import { act, keepFetched, useApp } from '../store/app';
-import { createStore, useSelected } from '../store/create';
+import { createStore, PAGE, useSelected } from '../store/create';
 import { LANGUAGE, S } from '../strings';
 import { NOTES } from '../words/notes';
 
@@ -30,7 +30,7 @@ export const standing = (notes: readonly Note[]) =>
 
 const PACE_MS = 500;
 
-export const startNotes = (): (() => void) =>
+export const startNotes = (signal = PAGE): void =>
   keepFetched<readonly Note[]>(
     {
       paceMs: PACE_MS,
@@ -39,6 +39,7 @@ export const startNotes = (): (() => void) =>
     ({ twin: { alarms, connection } }) =>
       // A journal without notes needs no request.
       alarms?.notes ? { key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes } : undefined,
+    signal,
   );
 
 /** Marks closer than this share of the span would overlap. */

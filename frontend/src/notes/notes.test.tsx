@@ -4,6 +4,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 import type { Note } from '../contract/types';
 import { act, receive } from '../store/app';
 import { person } from '../store/create';
+import { started } from '../testing/life';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { clustersOf, NoteMarks, standing, standingNotes, startNotes } from './NoteMarks';
@@ -71,7 +72,7 @@ test('marks that would cover each other are one, and those outside of the span n
 });
 
 test('comments are fetched when their number grows, and shown with name and time', async () => {
-  const stop = startNotes();
+  const stop = started(startNotes);
   render(<Comments subject="tag:7" name="Tag 7" />);
   report(0);
   expect(requests).toEqual([]);

@@ -153,21 +153,20 @@ const PACE_MS = 5_000;
 function useTrail(): readonly Point[] {
   const [trail, setTrail] = useState<readonly Point[]>([]);
   useEffect(() => {
-    const stop = keepFetched<Robot>(
+    const gone = new AbortController();
+    keepFetched<Robot>(
       { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail) },
       ({ twin }) =>
         twin.connection.socket.kind === 'open'
           ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
           : null,
+      gone.signal,
     );
-    const unsubscribe = robotFrame.subscribe(() => {
+    robotFrame.subscribe(() => {
       const position = robotFrame.get()?.position;
       if (position) setTrail((last) => extended(last, position));
-    });
-    return () => {
-      stop();
-      unsubscribe();
-    };
+    }, gone.signal);
+    return () => gone.abort();
   }, []);
   return trail;
 }

@@ -2,6 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { snapshotOf } from '../domain/twin';
 import { timelineOf } from '../domain/timeline';
+import { started } from '../testing/life';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { npy, npyEstimate, npyField } from '../testing/field';
 import { wireTimeline } from '../testing/timeline';
@@ -40,7 +41,7 @@ beforeEach(() => {
   });
   showTags([wireTag({ readings: readings({ temperature: 22 }) })]);
   goLive(status({ day_length_s: 60 }));
-  stop = startDifference();
+  stop = started(startDifference);
 });
 afterEach(() => {
   stop();

@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { timelineOf } from '../domain/timeline';
+import { started } from '../testing/life';
 import { wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
@@ -27,7 +28,7 @@ const address = (): string => toFragment(store.get().view);
 beforeEach(() => {
   receive({ remembered: NOTHING });
   act(DEFAULT_VIEW);
-  stop = startOpening();
+  stop = started(startOpening);
 });
 afterEach(() => {
   stop();

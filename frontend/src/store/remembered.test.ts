@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { goLive, goLost, showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTimeline } from '../testing/timeline';
@@ -23,7 +24,7 @@ beforeEach(() => {
   });
   receive({ remembered: NOTHING });
   showTags([wireTag()]);
-  stop = startRemembered();
+  stop = started(startRemembered);
 });
 afterEach(() => {
   stop();
@@ -75,7 +76,7 @@ test('another period is fetched at once, and nothing of the last is left', async
 });
 
 test('a link that names no period brings back what the page opens on, at once', async () => {
-  const stopOpening = startOpening();
+  const stopOpening = started(startOpening);
   const latest = stateFrame([wireTag()], { sec: 1_000_000, revision: 'r' });
   receive(withState(latest, performance.now()));
   answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: { from: 0, to: 240 } }));

@@ -8,6 +8,7 @@ import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
+import { started } from '../../testing/life';
 import { alarm, alarms, reportAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
 import { judgement, reason } from '../../testing/health';
@@ -19,7 +20,7 @@ beforeEach(() => {
   lastAction.set(null);
   person.set(null);
   showTags([wireTag()]);
-  const stop = startAlarms();
+  const stop = started(startAlarms);
   render(<AlarmPanel />);
   return stop;
 });

@@ -6,6 +6,7 @@ import { alarmList, startAlarms } from '../../alarms/watch';
 import { act, receive } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
+import { started } from '../../testing/life';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
 import { goLive, goLost, showTags } from '../../testing/page';
@@ -20,7 +21,7 @@ let stop: () => void;
 beforeEach(() => {
   own.set(NO_LOCAL_ALARMS);
   showTags([wireTag({ tag_id: '7' })]);
-  stop = startAlarms();
+  stop = started(startAlarms);
   render(<CardAlarms tagId="7" />);
 });
 afterEach(() => {

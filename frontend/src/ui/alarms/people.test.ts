@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { started } from '../../testing/life';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import {
   acknowledgeAlarms,
@@ -97,7 +98,7 @@ afterEach(() => {
 });
 
 const signedIn = async (): Promise<void> => {
-  stops.push(startPeople());
+  stops.push(started(startPeople));
   await vi.waitFor(() => {
     expect(person.get()?.name).toBe('anna');
   });
@@ -107,7 +108,7 @@ const signedIn = async (): Promise<void> => {
 test('who has signed in is known also where the bridge was away at first', async () => {
   vi.useFakeTimers();
   isAway = true;
-  stops.push(startPeople(), () => vi.useRealTimers());
+  stops.push(started(startPeople), () => vi.useRealTimers());
   await vi.advanceTimersByTimeAsync(100);
   expect(requests).toHaveLength(1);
   isAway = false;

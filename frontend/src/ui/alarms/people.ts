@@ -10,7 +10,7 @@ import { failureText } from '../../domain/format';
 import { shown } from '../../domain/text';
 import { keepFetched, onChange, store, useApp } from '../../store/app';
 import { rosNow, selectIsDisconnected } from '../../store/moment';
-import { person, useSelected } from '../../store/create';
+import { PAGE, person, useSelected } from '../../store/create';
 import { say } from '../toast';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -134,34 +134,32 @@ async function share(before: LocalAlarms, next: LocalAlarms): Promise<void> {
   if (failure !== null || store.get().twin.alarms !== alarms) take();
 }
 
-/** Fetches the signed-in user on each connection; returns a stop function. */
-export function startPeople(): () => void {
-  const stops = [
-    // On failure, everything stays as it is until a retry succeeds.
-    keepFetched<Session>(
-      {
-        paceMs: PACE_MS,
-        parts: ({ twin }) => [twin.connection.epoch],
-        onValue: (found) => {
-          person.set(found);
-          acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
-          take();
-        },
+/** Fetches the signed-in user on each connection. */
+export function startPeople(signal = PAGE): void {
+  // On failure, everything stays as it is until a retry succeeds.
+  keepFetched<Session>(
+    {
+      paceMs: PACE_MS,
+      parts: ({ twin }) => [twin.connection.epoch],
+      onValue: (found) => {
+        person.set(found);
+        acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
+        take();
       },
-      ({ twin }) => ({
-        // The first connection opens during this fetch, to the same bridge: no need to fetch again.
-        key: String(Math.max(1, twin.connection.epoch)),
-        group: 'session',
-        run: fetchSession,
-      }),
-    ),
-    onChange(({ twin }) => [twin.alarms], take),
-  ];
-  return () => {
-    for (const stop of stops) stop();
+    },
+    ({ twin }) => ({
+      // The first connection opens during this fetch, to the same bridge: no need to fetch again.
+      key: String(Math.max(1, twin.connection.epoch)),
+      group: 'session',
+      run: fetchSession,
+    }),
+    signal,
+  );
+  onChange(({ twin }) => [twin.alarms], take, signal);
+  signal.addEventListener('abort', () => {
     acting.share = null;
     person.set(null);
-  };
+  });
 }
 
 /** Whether actions would be refused: they are shared, and the bridge does not answer. */

@@ -12,7 +12,8 @@ const LAPSE_MS = 2_000;
 /** Lapses remembered, for the time of day of earlier moments. */
 const MOST_ERAS = 100;
 
-const listeners = new Set<() => void>();
+/** Hears `lapse` when time has lapsed. */
+export const lapses = new EventTarget();
 /** The last monotonic reading. */
 let last = performance.now();
 /** Periods without a lapse: their beginning, and the wall clock minus the monotonic one. */
@@ -32,7 +33,7 @@ export function now(): number {
   last = at;
   if (era && !hasGoneBack && offset - era.offset > LAPSE_MS) {
     eras = [...eras.slice(-MOST_ERAS), { from: at, offset }];
-    for (const listener of [...listeners]) listener();
+    lapses.dispatchEvent(new Event('lapse'));
     return at;
   }
   // Slewed or set back: the newer offset is the better one.
@@ -49,12 +50,6 @@ export function epochOf(moment: number): number {
   // In the present period, the present offset, unless there is an undetected lapse.
   const isPresent = era === eras.at(-1) && offset - era.offset <= LAPSE_MS;
   return moment + (isPresent ? offset : era.offset);
-}
-
-/** Calls back when time has lapsed; returns a stop function. */
-export function onLapse(listener: () => void): () => void {
-  listeners.add(listener);
-  return () => listeners.delete(listener);
 }
 
 /** Time of day on the operator's own clock, ms since the epoch. */

@@ -1,10 +1,10 @@
 /** Views of the alarm list: filtered, sorted, grouped by cause and area, or as CSV. Pure. */
-import type { Alarm, WireTime } from '../contract/types';
+import type { Alarm } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
 import { airOf, isOfRange, nameOf, sideOf } from '../domain/health';
 import { groupedBy } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
-import { secondsOf } from '../domain/time';
+import { isoText } from '../domain/time';
 import { compareIds } from '../domain/twin';
 import { toShown } from '../domain/format';
 import { S } from '../strings';
@@ -52,7 +52,7 @@ export function arranged(
   if (order !== 'cause') {
     const by =
       order === 'newest'
-        ? (a: Item, b: Item) => secondsOf(b.alarm.raised_at) - secondsOf(a.alarm.raised_at)
+        ? (a: Item, b: Item) => b.alarm.raised_at - a.alarm.raised_at
         : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
     return [{ key: order, cause: null, items: [...items].sort(by) }];
   }
@@ -107,9 +107,6 @@ export function tagsText(ids: readonly string[]): string {
   return S.alarmTags(named, ids.length - count);
 }
 
-const iso = (at: WireTime | null): string | null =>
-  at && new Date(secondsOf(at) * 1000).toISOString();
-
 /** CSV for programs: the same column names in every language, values in the page's units. */
 export function alarmsCsv(
   list: AlarmList,
@@ -136,7 +133,7 @@ export function alarmsCsv(
         ...[reason.sensor === '' ? null : sensor.unit, value(reason.limit)],
         value(current?.kind === 'known' ? current.value : null),
         ...[value(worstOf(alarm, current)), value(reason.value)],
-        ...[iso(alarm.raised_at), iso(alarm.cleared_at)],
+        ...[isoText(alarm.raised_at), alarm.cleared_at && isoText(alarm.cleared_at)],
         isAcknowledged ? 'yes' : 'no',
         ...[shelf && new Date(shelf.until).toISOString(), shelf?.reason || null],
       ];

@@ -4,6 +4,7 @@ import { theMap, type MapActions } from '../map/commands';
 import { act, receive, store } from '../store/app';
 import { withState } from '../store/twin';
 import { withList, withTag } from '../store/view';
+import { started } from '../testing/life';
 import { alarm, reportAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
@@ -49,7 +50,7 @@ describe('follow', () => {
     showTags([]);
     const latest = stateFrame([wireTag()], { sec: 10_000 });
     receive(withState(latest, performance.now()));
-    stops = [startAlarms()];
+    stops = [started(startAlarms)];
     theMap.set({ show: (tagId) => void seen.push(tagId) } as MapActions);
   });
   afterEach(() => {
@@ -74,7 +75,7 @@ describe('follow', () => {
   test('its start is the moment of the observation that raised it, and no earlier', () => {
     const co2 = {
       ...alarm('a', { tag_id: '5', reason: { sensor: 'co2' } }),
-      raised_at: { sec: 9_000, nanosec: 1_200_001 },
+      raised_at: 9_000.0012,
     };
     act(withList('alarms'));
     goToStart(co2);

@@ -1,7 +1,7 @@
 /** Navigation from an alarm: to its tag live, and to the moment when it was raised. */
 import { now } from '../clock';
 import type { Alarm } from '../contract/types';
-import { type Period, secondsOf, spanOf } from '../domain/time';
+import { type Period, spanOf } from '../domain/time';
 import { theMap } from '../map/commands';
 import { act, store } from '../store/app';
 import { rosNow } from '../store/moment';
@@ -41,7 +41,7 @@ export function goToStart(alarm: Alarm): void {
   const { period } = store.get().view;
   const oldest = store.get().twin.remembered.value?.reach?.from ?? null;
   // Round up to the millisecond: rounding down would miss the observation.
-  const at = Math.ceil(secondsOf(alarm.raised_at) * 1000) / 1000;
+  const at = Math.ceil(alarm.raised_at * 1000) / 1000;
   if (nowS === null || at > nowS) return;
   look(alarm, { moment: at, period: periodWith(period, at, nowS, oldest), pane: 'map' });
 }

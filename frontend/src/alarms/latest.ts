@@ -1,5 +1,5 @@
 /** Alarms with the latest values, whatever moment is shown. */
-import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectLatestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
@@ -11,7 +11,7 @@ import { causeOf, inOrder, type Item } from './list';
 import { alarmText, nowOf, partsText, reasonNow, whereText, type Now } from './words';
 
 /** From when on alarms are known; null: not reported. */
-export const selectKnownSince = ({ twin }: AppState): WireTime | null => twin.alarms?.since ?? null;
+export const selectKnownSince = ({ twin }: AppState): number | null => twin.alarms?.since ?? null;
 
 /** An alarm's value now, whatever moment is shown; null: it has no value. */
 export function selectNow(

@@ -97,7 +97,7 @@ describe('news', () => {
     expect(newsIds(list([a]), list([b, a]))).toEqual([['b'], []]);
     expect(newsIds(list([a]), list([{ ...a, reason: reason() }]))).toEqual([['a'], []]);
     expect(newsIds(list([{ ...a, reason: reason() }]), list([a]))).toEqual([[], []]);
-    const over = { ...a, cleared_at: { sec: 999, nanosec: 0 } };
+    const over = { ...a, cleared_at: 999 };
     expect(newsIds(list([a, b]), list([over, b]))).toEqual([[], ['a']]);
     expect(newsIds(EMPTY_LIST, list([over]))).toEqual([[], []]);
     expect(newsIds(list([a]), list([]))).toEqual([[], []]);

@@ -4,7 +4,6 @@ import { numberText } from '../domain/format';
 import { airOf, isOfRange, severity, sideOf } from '../domain/health';
 import { withParts } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
-import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, faultKey, type LocalAlarms, type Shelf } from './own';
 
@@ -89,7 +88,7 @@ export function listOf(
 const isListed = (end: number, nowS: number | null): boolean =>
   nowS === null || nowS - end < LISTED_S;
 
-const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared_at) : Infinity);
+const endOf = ({ cleared_at }: Alarm): number => cleared_at ?? Infinity;
 
 /** Sorted by the `severity` of the given reasons; ties by tag and id, so that the order is stable. */
 export const inOrder = (
@@ -121,9 +120,7 @@ export function causeOf({ reason, tag_id }: Wrong['alarm'], sensors: Catalogue):
 
 /** The alarm raised first. */
 export const oldestOf = (items: readonly Item[]): Alarm | undefined =>
-  items
-    .map(({ alarm }) => alarm)
-    .sort((a, b) => secondsOf(a.raised_at) - secondsOf(b.raised_at))[0];
+  items.map(({ alarm }) => alarm).sort((a, b) => a.raised_at - b.raised_at)[0];
 
 /** Items neither acknowledged nor shelved; a held list may contain both. */
 export const unacknowledged = (items: readonly Item[]): readonly Item[] =>

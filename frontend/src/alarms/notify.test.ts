@@ -6,6 +6,7 @@ import type { Alarm } from '../contract/types';
 import { act, receive, store } from '../store/app';
 import { announce } from '../store/create';
 import { NO_HOUSE, withPast } from '../store/twin';
+import { started } from '../testing/life';
 import { alarm, reportAlarms } from '../testing/alarms';
 import { judgement, reason } from '../testing/health';
 import { goLive, goLost, showTags } from '../testing/page';
@@ -39,8 +40,8 @@ const cold = alarm('cold', { tag_id: '1' });
 const warm = alarm('warm', { tag_id: '2', reason: { ...STRESSED, value: 30, limit: 26 } });
 let stops: (() => void)[];
 
-const start = (...starts: (() => () => void)[]): void => {
-  stops = [startAlarms, ...starts].map((each) => each());
+const start = (...starts: ((signal: AbortSignal) => void)[]): void => {
+  stops = [startAlarms, ...starts].map(started);
   // The alarms that the page starts with.
   reportAlarms();
 };
@@ -133,10 +134,7 @@ describe('voices', () => {
   test('a resolved alarm is announced once, together with new ones', () => {
     start(startVoices);
     reportAlarms(warm);
-    reportAlarms(
-      { ...warm, cleared_at: { sec: 990, nanosec: 0 } },
-      alarm('x', { reason: STRESSED }),
-    );
+    reportAlarms({ ...warm, cleared_at: 990 }, alarm('x', { reason: STRESSED }));
     expect(said()[0]).toMatch(/^New: Tag 1: .*\. Resolved: Tag 2: Temperature/);
   });
 });
@@ -186,7 +184,7 @@ describe('sound', () => {
     const at = Math.ceil(performance.now()); // otherwise ten seconds later rounds to slightly less
     const clock = vi.spyOn(performance, 'now').mockReturnValue(at);
     vi.spyOn(Date, 'now').mockReturnValue(1_800_000_000_000);
-    start(() => startSound(make));
+    start((on) => startSound(make, on));
     reportAlarms(...many(1));
     expect(audio.notes).toBe(0);
     await setSound(true, make);
@@ -210,7 +208,7 @@ describe('sound', () => {
   test('enabled on an earlier visit, it waits for a click, and says so', async () => {
     const audio = new Audio(false);
     own.set({ ...NO_LOCAL_ALARMS, sound: true });
-    start(() => startSound(() => audio as unknown as AudioContext));
+    start((on) => startSound(() => audio as unknown as AudioContext, on));
     expect(soundState.get()).toBe('waits');
     document.dispatchEvent(new Event('pointerup'));
     await vi.waitFor(() => {

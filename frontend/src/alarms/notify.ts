@@ -4,7 +4,7 @@ import { request } from '../contract/api';
 import { postPush } from '../contract/people';
 import type { Verdict } from '../contract/types';
 import { onChange, store } from '../store/app';
-import { createStore } from '../store/create';
+import { createStore, PAGE } from '../store/create';
 import { selectOrigin } from '../store/moment';
 import { S } from '../strings';
 import { showAlarm } from './follow';
@@ -86,16 +86,16 @@ async function showByWorker(title: string, options: NotificationOptions): Promis
   return worker !== undefined;
 }
 
-/** Notifies of new alarms if enabled and the page is not in use; returns a stop function. */
-export function startNotify(): () => void {
+/** Notifies of new alarms if enabled and the page is not in use. */
+export function startNotify(signal = PAGE): void {
   notifyState.set(stateNow());
   // Anew on each visit: the browser, its push service or the bridge may have forgotten it.
   if (own.get().notify && notifyState.get() === 'granted') void tryPush(true);
-  return onNews(({ raised }) => {
+  onNews(({ raised }) => {
     notifyState.set(stateNow());
     const isLooking = document.visibilityState === 'visible' && document.hasFocus();
     if (own.get().notify && notifyState.get() === 'granted' && !isLooking) void show(raised);
-  });
+  }, signal);
 }
 
 interface Key {
@@ -158,10 +158,10 @@ export function badgeOf(count: number, worst: Verdict): string | null {
   return `data:image/svg+xml,${encodeURIComponent(svg)}`;
 }
 
-/** Keeps the favicon up to date; returns a stop function. */
-export function startBadge(): () => void {
+/** Keeps the favicon up to date. */
+export function startBadge(signal = PAGE): void {
   const link = document.querySelector<HTMLLinkElement>('link[rel=icon]');
-  if (!link) return () => undefined;
+  if (!link) return;
   const plain = link.getAttribute('href') ?? '';
   const update = (): void => {
     const items = alarmList.get().active;
@@ -169,13 +169,8 @@ export function startBadge(): () => void {
     if (link.getAttribute('href') !== href) link.setAttribute('href', href);
   };
   update();
-  const stops = [
-    alarmList.subscribe(update),
-    onChange((state) => [worstNow(state, alarmList.get().active)], update),
-  ];
-  return () => {
-    for (const stop of stops) stop();
-  };
+  alarmList.subscribe(update, signal);
+  onChange((state) => [worstNow(state, alarmList.get().active)], update, signal);
 }
 
 /** Least time between two sounds, ms. */
@@ -245,26 +240,23 @@ export async function setSound(
   sound(NOTES.other);
 }
 
-/** Plays a sound for new alarms if enabled; returns a stop function. */
-export function startSound(make: () => AudioContext = () => new AudioContext()): () => void {
+/** Plays a sound for new alarms if enabled. */
+export function startSound(make = (): AudioContext => new AudioContext(), signal = PAGE): void {
   // Enabled on an earlier visit: the first click or key unlocks the sound.
   const onGesture = (): void => {
     if (own.get().sound && context?.state !== 'running') void wake(make);
   };
-  document.addEventListener('pointerup', onGesture);
-  document.addEventListener('keyup', onGesture);
-  const stop = onNews(({ raised }) => {
+  document.addEventListener('pointerup', onGesture, { signal });
+  document.addEventListener('keyup', onGesture, { signal });
+  onNews(({ raised }) => {
     if (raised.length === 0 || !own.get().sound) return;
     const isCritical = raised.some(({ alarm }) => alarm.reason.verdict === 'critical');
     sound(NOTES[isCritical ? 'critical' : 'other']);
-  });
-  return () => {
-    stop();
-    document.removeEventListener('pointerup', onGesture);
-    document.removeEventListener('keyup', onGesture);
+  }, signal);
+  signal.addEventListener('abort', () => {
     void context?.close().catch(() => undefined);
     context = null;
     playedAt = -Infinity;
     soundState.set('waits');
-  };
+  });
 }

@@ -7,7 +7,7 @@ import { timeOfDay } from '../clock';
 import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { store } from '../store/app';
-import { createStore, person } from '../store/create';
+import { createStore, PAGE, person } from '../store/create';
 
 /** An acknowledgement of an alarm no longer listed is deleted after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
@@ -264,20 +264,16 @@ export const updateNotifySettings = (way: Partial<Pick<LocalAlarms, 'sound' | 'n
   own.set({ ...own.get(), ...way });
 };
 
-/** Loads the stored state, and stores every change; returns a stop function. */
-export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
+/** Loads the stored state, and stores every change. */
+export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>, signal = PAGE): void {
   own.set(readStored(storage));
-  const stop = own.subscribe(() => writeStored(storage, own.get()));
+  own.subscribe(() => writeStored(storage, own.get()), signal);
   // Another tab changed the state: undoing here would undo its change too.
   const onStorage = ({ key }: StorageEvent): void => {
     if (key !== KEY && key !== null) return;
     own.set(readStored(storage));
     setLastAction(null);
   };
-  window.addEventListener('storage', onStorage);
-  return () => {
-    stop();
-    setLastAction(null);
-    window.removeEventListener('storage', onStorage);
-  };
+  window.addEventListener('storage', onStorage, { signal });
+  signal.addEventListener('abort', () => setLastAction(null));
 }

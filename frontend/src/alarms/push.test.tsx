@@ -4,6 +4,7 @@ import { afterEach, expect, test, vi } from 'vitest';
 import { NotifySettings } from '../ui/alarms/AlarmNotes';
 import { isPushed, setNotify, setPush, startNotify } from './notify';
 import { NO_LOCAL_ALARMS, own } from './own';
+import { started } from '../testing/life';
 
 afterEach(() => {
   vi.unstubAllGlobals();
@@ -51,7 +52,7 @@ test('each visit subscribes anew: the push service may have ended the subscripti
   vi.stubGlobal('Notification', { permission: 'granted' });
   vi.stubGlobal('isSecureContext', true);
   own.set({ ...NO_LOCAL_ALARMS, notify: true });
-  startNotify()();
+  started(startNotify)();
   render(<NotifySettings />);
   // A grower who relies on the phone learns whether the bridge reaches it.
   screen.getByText(/while this page is open in the background\.$/);

@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { act, receive } from '../store/app';
+import { started } from '../testing/life';
 import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -38,13 +39,15 @@ const storage = {
 
 const start = (): void => {
   stops = [
-    startOwn(storage),
-    startAlarms(),
-    startMeanwhile(),
-    onNews(({ raised, cleared }) => {
-      announced.push(...raised.map(({ alarm: { id } }) => id));
-      announced.push(...cleared.map(({ alarm: { id } }) => `-${id}`));
-    }),
+    started((on) => startOwn(storage, on)),
+    started(startAlarms),
+    started(startMeanwhile),
+    started((on) =>
+      onNews(({ raised, cleared }) => {
+        announced.push(...raised.map(({ alarm: { id } }) => id));
+        announced.push(...cleared.map(({ alarm: { id } }) => `-${id}`));
+      }, on),
+    ),
   ];
 };
 const stop = (): void => {
@@ -191,7 +194,7 @@ test('while a past moment is shown, new alarms are listed apart until acknowledg
   expect(now()).toEqual(['c', 'b']);
   acknowledgeAlarms([item('b')]);
   expect(now()).toEqual(['c']);
-  reportAlarms({ ...c, cleared_at: { sec: 990, nanosec: 0 } }, b, alarm('a'));
+  reportAlarms({ ...c, cleared_at: 990 }, b, alarm('a'));
   expect(now()).toEqual([]);
   reportAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
   expect(now()).toEqual(['d']);

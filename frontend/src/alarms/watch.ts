@@ -6,7 +6,7 @@ import { now, timeOfDay } from '../clock';
 import type { Alarms } from '../contract/types';
 import { rosText } from '../domain/time';
 import { type AppState, onChange, store } from '../store/app';
-import { announce, createStore, createVoice } from '../store/create';
+import { announce, createStore, createVoice, PAGE } from '../store/create';
 import { rosNow, selectIsDisconnected, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { nextEnd, own, pruned, startOwn } from './own';
@@ -26,19 +26,17 @@ import { severalNow } from './latest';
 /** The current alarms. */
 export const alarmList = createStore<AlarmList>(EMPTY_LIST);
 
-type Listener = (news: News) => void;
-const listeners = new Set<Listener>();
+const news = createStore<News>({ raised: [], cleared: [] });
 
-/** Calls `listener` once per change; returns a stop function. */
-export function onNews(listener: Listener): () => void {
-  listeners.add(listener);
-  return () => listeners.delete(listener);
+/** Calls `listener` once per change. */
+export function onNews(listener: (news: News) => void, signal: AbortSignal): void {
+  news.subscribe(() => listener(news.get()), signal);
 }
 
 /** Longest delay before an expired resolved alarm leaves the list, ms. */
 const SWEEP_MS = 60_000;
 
-export function startAlarms(): () => void {
+export function startAlarms(signal = PAGE): void {
   /** The list last announced; null: none received yet, and the first one is no news. */
   let announced: AlarmList | null = null;
   let checked = own.get();
@@ -55,25 +53,23 @@ export function startAlarms(): () => void {
     if (local !== own.get()) own.set(local);
     if (!alarms) return;
     const list = listOf(alarms.alarms, local, rosNow(state, now()), at);
-    const news = announced && !isOwnDoing ? newsOf(announced, list) : null;
+    const found = announced && !isOwnDoing ? newsOf(announced, list) : null;
     // While the bridge replays the past, alarms missing from the list are not resolved.
     if (alarms.source !== 'starting') announced = list;
     alarmList.set(sharedList(alarmList.get(), list));
-    if (news && news.raised.length + news.cleared.length > 0) {
-      for (const listener of [...listeners]) listener(news);
-    }
+    if (found && found.raised.length + found.cleared.length > 0) news.set(found);
   };
   const onAlarms = (): void => update(false);
   const onOwn = (): void => {
     if (checked !== own.get()) update(true);
   };
   update(true);
-  const stops = [onChange(({ twin }) => [twin.alarms], onAlarms), own.subscribe(onOwn)];
-  return () => {
+  onChange(({ twin }) => [twin.alarms], onAlarms, signal);
+  own.subscribe(onOwn, signal);
+  signal.addEventListener('abort', () => {
     clearTimeout(timer);
-    for (const stop of stops) stop();
     alarmList.set(EMPTY_LIST);
-  };
+  });
 }
 
 /** Ids of the listed alarms; null: not known, or not yet all. */
@@ -92,7 +88,7 @@ export function dismissMeanwhile(): void {
   meanwhile.set([]);
 }
 
-export function startMeanwhile(): () => void {
+export function startMeanwhile(signal = PAGE): void {
   const update = (): void => {
     if (store.get().view.moment === null) ids = new Set();
     const before = meanwhile.get();
@@ -100,19 +96,14 @@ export function startMeanwhile(): () => void {
     const isSame = next.length === before.length && next.every((it, at) => it === before[at]);
     if (!isSame) meanwhile.set(next);
   };
-  const stops = [
-    onNews(({ raised }) => {
-      if (store.get().view.moment === null) return;
-      ids = new Set([...ids, ...raised.map(({ alarm }) => alarm.id)]);
-      update();
-    }),
-    alarmList.subscribe(update),
-    store.subscribe(update),
-  ];
+  onNews(({ raised }) => {
+    if (store.get().view.moment === null) return;
+    ids = new Set([...ids, ...raised.map(({ alarm }) => alarm.id)]);
+    update();
+  }, signal);
+  alarmList.subscribe(update, signal);
+  store.subscribe(update, signal);
   update();
-  return () => {
-    for (const stop of stops) stop();
-  };
 }
 
 /** The page title: number of active alarms, a note on the connection, and the shown moment. */
@@ -130,8 +121,8 @@ const noteOf = (state: AppState): string | undefined =>
       ? S.origin.recorded
       : undefined;
 
-/** Keeps the page title up to date; returns a stop function. */
-export function startTitle(): () => void {
+/** Keeps the page title up to date. */
+export function startTitle(signal = PAGE): void {
   const update = (): void => {
     const state = store.get();
     const { moment } = selectShown(state);
@@ -139,10 +130,8 @@ export function startTitle(): () => void {
     if (document.title !== title) document.title = title;
   };
   update();
-  const stops = [store.subscribe(update), alarmList.subscribe(update)];
-  return () => {
-    for (const stop of stops) stop();
-  };
+  store.subscribe(update, signal);
+  alarmList.subscribe(update, signal);
 }
 
 /** For screen readers: waits for the current speech to end. */
@@ -158,19 +147,18 @@ function newsText({ raised, cleared }: News): string {
   return [...text(raised, S.alarmsRaised), ...text(cleared, S.alarmsCleared)].join('. ');
 }
 
-/** Announces changes to screen readers; returns a stop function. */
-export const startVoices = (): (() => void) =>
-  onNews((news) => {
-    const isUrgent = news.raised.some(({ alarm }) => alarm.reason.verdict === 'critical');
-    announce(isUrgent ? urgentVoice : politeVoice, newsText(news));
-  });
+/** Announces changes to screen readers. */
+export const startVoices = (signal = PAGE): void =>
+  onNews((found) => {
+    const isUrgent = found.raised.some(({ alarm }) => alarm.reason.verdict === 'critical');
+    announce(isUrgent ? urgentVoice : politeVoice, newsText(found));
+  }, signal);
 
 export function startAlarmsAndAnnouncements(
   storage: Pick<Storage, 'getItem' | 'setItem'>,
-): () => void {
+  signal = PAGE,
+): void {
   // Stored state first, so that alarms acknowledged on an earlier visit are not announced.
-  const stops = [startOwn(storage), startAlarms(), startTitle(), startVoices(), startMeanwhile()];
-  return () => {
-    for (const stop of stops.reverse()) stop();
-  };
+  startOwn(storage, signal);
+  for (const start of [startAlarms, startTitle, startVoices, startMeanwhile]) start(signal);
 }

@@ -151,7 +151,7 @@ test('since when and until when: of today the time alone, to the minute', () => 
 });
 
 test('what the log does not reach back to has lasted for longer than is known', () => {
-  const at = (sec: number) => ({ sec: NOON + sec, nanosec: 0 });
+  const at = (sec: number): number => NOON + sec;
   const old = alarm('a', { raised: NOON + 900, reason: { since: at(0) } });
   const text = (known: number, each = old) => spanText(each, NOON + 1_500, at(known));
   expect(text(-899)).toBe('for over 10\u00a0min');

@@ -1,5 +1,5 @@
 /** An alarm in words: what, where, value now and at worst, since when, until when. Pure. */
-import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import { ageText, beyondLimitText, minuteText, readingText } from '../domain/format';
 import {
@@ -13,7 +13,7 @@ import {
 } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { ageSeconds, dayFormat, hasDate, secondsOf, shortRosText, type When } from '../domain/time';
+import { ageSeconds, dayFormat, hasDate, shortRosText, type When } from '../domain/time';
 import { S } from '../strings';
 import type { Item } from './list';
 
@@ -130,15 +130,15 @@ export function unknownText(
  * Whether it may have begun before `known`, from when on alarms are known: its tag had no earlier scan,
  * because its first two bad ones are farther apart.
  */
-const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: WireTime | null): boolean =>
+const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: number | null): boolean =>
   (kind === 'range' || kind === 'reading_failed' || kind === 'scan_failed') &&
   known !== null &&
   since !== null &&
-  secondsOf(since) - secondsOf(known) < secondsOf(raised_at) - secondsOf(since);
+  since - known < raised_at - since;
 
 /** Since when; at least how long, if it may be older than `known`. */
-export function sinceText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
-  const from = secondsOf(alarm.raised_at);
+export function sinceText(alarm: Alarm, nowS: number | null, known: number | null): string {
+  const from = alarm.raised_at;
   const length = ageSeconds(from, nowS);
   return length !== null && isOlder(alarm, known)
     ? S.alarmForOver(lengthText(length))
@@ -146,29 +146,27 @@ export function sinceText(alarm: Alarm, nowS: number | null, known: WireTime | n
 }
 
 /** For how long, unless `sinceText` says it; of an active alarm, only if it began today. Empty: not known. */
-export function lengthOf(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
-  const { raised_at, cleared_at } = alarm;
-  const from = secondsOf(raised_at);
-  if (cleared_at) return lengthText(secondsOf(cleared_at) - from);
+export function lengthOf(alarm: Alarm, nowS: number | null, known: number | null): string {
+  const { raised_at: from, cleared_at } = alarm;
+  if (cleared_at !== null) return lengthText(cleared_at - from);
   const length = ageSeconds(from, nowS);
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
   return length === null || !isOfToday || isOlder(alarm, known) ? '' : lengthText(length);
 }
 
 /** Begin, end and duration of a resolved alarm; otherwise since when and for how long. */
-export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
-  const { raised_at, cleared_at } = alarm;
+export function spanText(alarm: Alarm, nowS: number | null, known: number | null): string {
+  const { raised_at: from, cleared_at: until } = alarm;
   const length = lengthOf(alarm, nowS, known);
-  if (cleared_at === null) {
+  if (until === null) {
     return `${sinceText(alarm, nowS, known)}${length === '' ? '' : ` (${length})`}`;
   }
-  const [from, until] = [secondsOf(raised_at), secondsOf(cleared_at)];
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
   return S.alarmUntil(whenText(from, nowS), end, length);
 }
 
 export const resolvedText = ({ cleared_at }: Alarm, nowS: number | null): string =>
-  cleared_at ? `${S.alarmResolved} ${whenText(secondsOf(cleared_at), nowS)}` : '';
+  cleared_at === null ? '' : `${S.alarmResolved} ${whenText(cleared_at, nowS)}`;
 
 /** Ten hours and more to the hour. */
 const lengthText = (seconds: number): string => {
@@ -267,7 +265,7 @@ export function nowOf(
   if (last === null) return unknown(null, readAt.get(sensor) ?? 'unknown');
   // An alarm may arrive before its reading.
   const read = tag.tag.wire.readings.find(({ name }) => name === sensor)?.observed_at;
-  if (read && secondsOf(read) < secondsOf(alarm.raised_at)) return unknown(null, 'unknown');
+  if (read != null && read < alarm.raised_at) return unknown(null, 'unknown');
   if (isOldReading(sensor, tag)) {
     // It is not of now, but its status is that of its tag: a bad one still counts.
     const judged = { value: last, verdict: said?.verdict ?? 'unknown', reason: said ?? null };

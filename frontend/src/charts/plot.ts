@@ -191,7 +191,7 @@ export function usePlot(
   height: number,
   hasTimes: boolean,
   handlers: PlotHandlers,
-  onLook: (listener: () => void) => () => void,
+  onLook: (listener: () => void, signal: AbortSignal) => void,
 ): RefObject<uPlot | null> {
   const plot = useRef<uPlot | null>(null);
   const latest = useRef(model);
@@ -208,12 +208,13 @@ export function usePlot(
     const chart = build(element, latest, hasTimes, handlers);
     plot.current = chart;
     // At once: a printer does not wait.
-    const stop = onLook(() => {
+    const gone = new AbortController();
+    onLook(() => {
       chart.batch(() => chart.redraw());
-    });
+    }, gone.signal);
     return () => {
       plot.current = null;
-      stop();
+      gone.abort();
       chart.destroy();
       handlers.onPoint(null);
     };

@@ -8,7 +8,7 @@ import { withState } from '../store/twin';
 import { DEFAULT_VIEW } from '../store/view';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { wireTime, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import type { Line } from './model';
 import { useCharts, type Charts } from './useCharts';
 
@@ -23,7 +23,7 @@ function answer(url: URL): Response {
   if (refuse) return refuse.clone();
   const query = url.searchParams;
   const [from, to] = [Number(query.get('from')), Number(query.get('to'))];
-  const bounds = { from: wireTime(from), to: wireTime(to), complete_to: null, kept_from: null };
+  const bounds = { from: from, to: to, complete_to: null, kept_from: null };
   if (url.pathname.endsWith('/history')) {
     return Response.json({
       ...bounds,
@@ -32,13 +32,13 @@ function answer(url: URL): Response {
       unit: 'ppm',
       is_bucketed: false,
       bucket_s: null,
-      readings: [{ stamp: wireTime(from + 10), value: 600 }],
+      readings: [{ stamp: from + 10, value: 600 }],
       buckets: [],
       gaps: [],
       nights: null,
     });
   }
-  const bucket = { start: wireTime(from), scans: 1, failures: 1, looks: 0 };
+  const bucket = { start: from, scans: 1, failures: 1, looks: 0 };
   return Response.json({
     ...bounds,
     bucket_s: 10,
@@ -52,7 +52,7 @@ function answer(url: URL): Response {
 /** A state with the tag as visited at a moment. */
 function visit(sec: number, over: Parameters<typeof wireTag>[0] = {}): void {
   flush(() => {
-    const latest = stateFrame([wireTag({ last_observed: wireTime(sec), ...over })], { sec });
+    const latest = stateFrame([wireTag({ last_observed: sec, ...over })], { sec });
     receive(withState(latest, performance.now()));
   });
 }
@@ -131,7 +131,7 @@ describe('lines are fetched again', () => {
     show();
     await passed(100);
     visit(NOW_S + 1);
-    visit(NOW_S + 2, { last_try: wireTime(NOW_S + 2) });
+    visit(NOW_S + 2, { last_try: NOW_S + 2 });
     await passed(3_000);
     expect(histories()).toHaveLength(1);
     await passed(1_500);

@@ -1,12 +1,13 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { onLapse } from '../clock';
+import { lapses } from '../clock';
 import { parseFrame, statusOf } from '../contract/frames';
 import type { Frame } from '../contract/types';
+import { started } from '../testing/life';
 import { status } from '../testing/page';
 import { stateFrame } from '../testing/tags';
 import { type Connection, type Phase, phaseOf, SILENCE_MS } from './machine';
-import { connect, type Link, signInIfRequired } from './socket';
+import { connect, type ConnectionHandlers, type Link, signInIfRequired } from './socket';
 
 class FakeSocket {
   static readonly made: FakeSocket[] = [];
@@ -29,6 +30,7 @@ class FakeSocket {
 }
 
 let link: Link;
+let stop: () => void;
 let frames: Frame[];
 let phases: Phase[];
 let refusals: number;
@@ -47,7 +49,7 @@ beforeEach(() => {
   phases = [];
   refusals = 0;
   bad = [];
-  link = connect('ws://test/ws/state', {
+  const handlers: ConnectionHandlers<Frame> = {
     parse: parseFrame,
     statusOf,
     onConnection: (connection: Connection) => {
@@ -57,11 +59,12 @@ beforeEach(() => {
     onFrame: (frame) => frames.push(frame),
     onBad: (why) => bad.push(why),
     onRefused: () => (refusals += 1),
-  });
+  };
+  stop = started((on) => (link = connect('ws://test/ws/state', handlers, on)));
 });
 
 afterEach(() => {
-  link.stop();
+  stop();
   vi.useRealTimers();
 });
 
@@ -134,8 +137,8 @@ describe('socket shell', () => {
 
   test('frames waiting in a socket after sleep are ignored: a new connection is made', () => {
     vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
-    const unsubscribe = onLapse(() => {
-      link.dispatch('start');
+    const unsubscribe = started((signal) => {
+      lapses.addEventListener('lapse', () => link.dispatch('start'), { signal });
     });
     socket(0).onopen?.();
     socket(0).speak(status());
@@ -151,7 +154,7 @@ describe('socket shell', () => {
   });
 
   test('stopped is stopped', () => {
-    link.stop();
+    stop();
     window.dispatchEvent(new Event('online'));
     vi.advanceTimersByTime(60_000);
     expect(FakeSocket.made).toHaveLength(1);

@@ -11,7 +11,7 @@ import {
   step,
 } from './machine';
 
-interface ConnectionHandlers<Frame> {
+export interface ConnectionHandlers<Frame> {
   readonly parse: (data: unknown) => Parsed<Frame>;
   /** Null for a state frame; undefined for one that only shows that the server is alive. */
   readonly statusOf?: (frame: Frame) => StatusFrame | null | undefined;
@@ -27,7 +27,11 @@ interface ConnectionHandlers<Frame> {
 export type Link = ReturnType<typeof connect>;
 
 /** Runs `machine.ts` with one socket, one timer and the browser's wake-up events. */
-export function connect<Frame>(url: string, handlers: ConnectionHandlers<Frame>) {
+export function connect<Frame>(
+  url: string,
+  handlers: ConnectionHandlers<Frame>,
+  signal: AbortSignal,
+) {
   let connection = INITIAL;
   let socket: WebSocket | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -97,21 +101,16 @@ export function connect<Frame>(url: string, handlers: ConnectionHandlers<Frame>)
   const wake = (): void => {
     if (document.visibilityState === 'visible') dispatch('wake');
   };
-  const online = (): void => dispatch('online');
-  document.addEventListener('visibilitychange', wake);
-  window.addEventListener('online', online);
-  window.addEventListener('pageshow', wake);
-
-  dispatch('start');
-
-  const stop = (): void => {
-    document.removeEventListener('visibilitychange', wake);
-    window.removeEventListener('online', online);
-    window.removeEventListener('pageshow', wake);
+  document.addEventListener('visibilitychange', wake, { signal });
+  window.addEventListener('online', () => dispatch('online'), { signal });
+  window.addEventListener('pageshow', wake, { signal });
+  signal.addEventListener('abort', () => {
     clearTimeout(timer);
     drop();
-  };
-  return { dispatch, stop };
+  });
+
+  dispatch('start');
+  return { dispatch };
 }
 
 /**

@@ -1,4 +1,5 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
+import { inSeconds } from './stamps';
 import type { Field, FieldQuality, TagHistory } from './types';
 
 export class Refusal extends Error {
@@ -70,7 +71,7 @@ export async function request(path: string, init: RequestInit): Promise<Response
 
 export async function bodyOf<T>(response: Response): Promise<T> {
   const type = response.headers.get('Content-Type') ?? 'no type';
-  const body: unknown = type.includes('json') ? await response.json() : type;
+  const body: unknown = type.includes('json') ? inSeconds(await response.json()) : type;
   if (typeof body !== 'object' || body === null) {
     const { pathname } = new URL(response.url, document.baseURI);
     throw new Error(`${pathname}: answered with ${String(body)}`);

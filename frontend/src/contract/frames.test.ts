@@ -23,18 +23,18 @@ const status = {
     state: 'failing',
     detail: 'no room',
     set_aside: '',
-    simulated: { start: { sec: 1, nanosec: 0 }, end: { sec: 2, nanosec: 0 } },
+    simulated: { start: 1, end: 2 },
   },
   outward: [{ channel: 'mqtt', is_failing: true, detail: 'refused' }],
 };
-const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
+const header = { stamp: 1, frame_id: 'map' };
 const bad = {
   kind: 'range',
   verdict: 'critical',
   sensor: 'temperature',
   value: 6.6,
   limit: 10,
-  since: { sec: 1, nanosec: 0 },
+  since: 1,
 };
 const health = { ...NOBODY, tags: { a: { verdict: 'critical', reasons: [bad] } } } as const;
 const delta = {
@@ -75,6 +75,12 @@ test.each([
   expect(parse(frame)).toEqual({ kind: 'frame', frame });
 });
 
+test('a stamp of the wire becomes seconds', () => {
+  const wire = { ...delta, header: { ...header, stamp: { sec: 12, nanosec: 250_000_000 } } };
+  const frame = { ...delta, header: { ...header, stamp: 12.25 } };
+  expect(parse(wire)).toEqual({ kind: 'frame', frame });
+});
+
 test('fields and reasons of a later server do no harm', () => {
   const later = { ...status, reason: 'on_holiday', more: [[[[]]]] };
   expect(parse(later)).toEqual({ kind: 'frame', frame: later });
@@ -95,15 +101,13 @@ test.each([
 });
 
 describe('filled', () => {
-  const sec = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
-
   /** As the server writes it: without defaults. */
   const tags = [
     {
-      ...wireTag({ tag_id: 'a', last_observed: sec(100), stale_seconds: 5 }),
+      ...wireTag({ tag_id: 'a', last_observed: 100, stale_seconds: 5 }),
       readings: [
         { name: 'co2', value: 1 },
-        { name: 'light', value: 2, observed_at: sec(40) },
+        { name: 'light', value: 2, observed_at: 40 },
         { name: 'ph', value: 3 },
         { name: 'ec', value: 4, observed_at: null },
         { name: 'vpd', value: 5 },
@@ -113,11 +117,11 @@ describe('filled', () => {
       last_try_status: undefined,
       last_try_detail: undefined,
       derived: { dew_point: 14 },
-      derived_at: sec(40),
+      derived_at: 40,
     },
     {
-      ...wireTag({ tag_id: 'b', last_observed: sec(0), stale_seconds: null }),
-      readings: [{ name: 'co2', value: 1, observed_at: sec(3) }],
+      ...wireTag({ tag_id: 'b', last_observed: 0, stale_seconds: null }),
+      readings: [{ name: 'co2', value: 1, observed_at: 3 }],
       derived: { dew_point: 15 },
     },
   ];
@@ -128,14 +132,14 @@ describe('filled', () => {
   const reading = (name: string, value: number, at: number | null): object => ({
     name,
     value,
-    observed_at: at === null ? null : sec(at),
+    observed_at: at,
   });
   const filled = [
     wireTag({
       tag_id: 'a',
-      last_observed: sec(100),
+      last_observed: 100,
       stale_seconds: 5,
-      last_try: sec(100),
+      last_try: 100,
       last_try_status: 0,
       readings: [
         reading('co2', 1, 100),
@@ -148,7 +152,7 @@ describe('filled', () => {
     }),
     wireTag({
       tag_id: 'b',
-      last_observed: sec(0),
+      last_observed: 0,
       stale_seconds: null,
       readings: [reading('co2', 1, 3), reading('dew_point', 15, 3)] as never,
     }),
@@ -185,15 +189,15 @@ describe('filled', () => {
 describe('latest', () => {
   const a = wireTag({
     tag_id: 'a',
-    last_observed: { sec: 995, nanosec: 0 },
+    last_observed: 995,
     readings: [
       // Flowers were inspected since.
-      { name: 'co2', value: 600, observed_at: { sec: 100, nanosec: 0 } },
+      { name: 'co2', value: 600, observed_at: 100 },
       // A twin that does not report it.
       { name: 'light', value: 9, observed_at: null },
     ],
   });
-  const b = wireTag({ tag_id: 'b', stale_seconds: null, last_observed: { sec: 0, nanosec: 0 } });
+  const b = wireTag({ tag_id: 'b', stale_seconds: null, last_observed: 0 });
   const full = stateFrame([a, b], { seq: 7, sec: 1000 });
 
   const delta = (over: Partial<DeltaFrame> = {}): DeltaFrame => ({
@@ -201,7 +205,7 @@ describe('latest', () => {
     seq: 8,
     base: 7,
     revision: 'r2',
-    header: { stamp: { sec: 1002, nanosec: 500_000_000 }, frame_id: 'map' },
+    header: { stamp: 1002.5, frame_id: 'map' },
     changed: [],
     removed: [],
     health: NOBODY,
@@ -224,7 +228,7 @@ describe('latest', () => {
     test('an unchanged tag is the very same', () => {
       const after = latestAfter(full, delta());
       expect(after?.state.tags[0]).toBe(a);
-      expect(after?.state.header.stamp.sec).toBe(1002);
+      expect(after?.state.header.stamp).toBe(1002.5);
     });
 
     test('a delta on another frame, or on none, cannot be used', () => {

@@ -1,4 +1,5 @@
 /** The frames of the WebSocket. */
+import { inSeconds } from './stamps';
 import type {
   DeltaFrame,
   Frame,
@@ -19,7 +20,7 @@ export type Parsed<F> =
 /** The server's tests compare its frames with the schemas that the types here are from. */
 export function parseFrame(data: unknown): Parsed<Frame> {
   try {
-    const frame = filled(JSON.parse(String(data)) as Frame);
+    const frame = filled(inSeconds(JSON.parse(String(data))) as Frame);
     return frame ? { kind: 'frame', frame } : { kind: 'passed over' };
   } catch (error) {
     return { kind: 'bad', why: String(error) };

@@ -19,11 +19,12 @@ const answering = (body: unknown, health: unknown = NOBODY): string[] => {
 
 describe('the state of a moment', () => {
   const { state } = stateFrame([], { sec: 1_794_000_000 });
-  const half = { ...state, header: { ...state.header, stamp: { sec: 12, nanosec: 500_000_000 } } };
+  const half = { ...state, header: { ...state.header, stamp: 12.5 } };
 
   test('is requested to the millisecond, with the verdicts of that moment', async () => {
     const health = judgement({ 1: [reason()] });
-    const requests = answering(half, health);
+    const stamp = { sec: 12, nanosec: 500_000_000 };
+    const requests = answering({ ...half, header: { ...half.header, stamp } }, health);
     await expect(fetchStateAt(12.5, signal)).resolves.toMatchObject({ state: half, health });
     expect(requests).toEqual(['/api/state?at=12.500', '/api/health?at=12.500']);
     expect([momentParameter(1_794_000_000.125), momentParameter(1e-7)]).toEqual([

@@ -18,10 +18,9 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
     }),
     answer<Schemas['Judgement']>(signal, 'api/health', ['house', 'tags'], query),
   ]);
-  const { sec, nanosec } = state.header.stamp;
   return {
     seq: 0,
-    revision: `at ${sec}.${nanosec}`,
+    revision: `at ${state.header.stamp}`,
     state: { ...state, tags: state.tags.map(filledTag) },
     health: filledHealth(health),
     isWhole,

@@ -1,7 +1,8 @@
 /** The web contract's types under short names; generated from the server's schema. */
 import type { components } from './openapi.gen';
+import type { InSeconds } from './stamps';
 
-export type Schemas = components['schemas'];
+export type Schemas = InSeconds<components['schemas']>;
 
 /** With the defaults that `frames.ts` restores. */
 export type TwinTagState = Required<
@@ -59,7 +60,6 @@ export type Place = Schemas['AdvisedPlace'];
 export type RobotNow = Omit<RobotFrame, 'type'>;
 export type Robot = Schemas['Robot'];
 export type WirePoint = Schemas['Point'];
-export type WireTime = Schemas['Time'];
 
 /** The ideal range; readings outside the wider `critical` are critical. */
 interface Bounds {

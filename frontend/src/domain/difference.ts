@@ -1,10 +1,9 @@
 /** A field minus that of another moment: yesterday against today. Pure. */
-import type { Field, TagHealth, WireTime } from '../contract/types';
+import type { Field, TagHealth } from '../contract/types';
 import { S } from '../strings';
 import { differenceNumber, intervalText, withUnit } from './format';
 import { fraction, mix, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 import type { Ranges, Sensor } from './sensors';
-import { secondsOf } from './time';
 import type { Tag } from './twin';
 
 /** How many days before the shown moment the other one is. */
@@ -121,13 +120,13 @@ export const hourText = (seconds: number): string | null =>
 /** A valid reading; `observed_at` null: unknown, as of a derived value. */
 export interface Taken {
   readonly value: number;
-  readonly observed_at: WireTime | null;
+  readonly observed_at: number | null;
 }
 
 /** A reading compared with one before; same: it is still that reading. */
 export function changeOf(now: Taken, then: Taken) {
-  const [a, b] = [now.observed_at, then.observed_at];
-  if (a && b && secondsOf(a) === secondsOf(b)) return { kind: 'same' } as const;
+  if (now.observed_at !== null && now.observed_at === then.observed_at)
+    return { kind: 'same' } as const;
   return { kind: 'by', by: now.value - then.value } as const;
 }
 
@@ -146,7 +145,7 @@ export function isOldReading(sensor: string, { tag, health }: TagThen): boolean 
   );
 }
 
-const takenAt = (sensor: string, { wire }: Tag): WireTime | null =>
+const takenAt = (sensor: string, { wire }: Tag): number | null =>
   wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null;
 
 /**

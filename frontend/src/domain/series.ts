@@ -5,10 +5,10 @@
 import type { History, Timeline } from '../contract/types';
 import { type Cell, csv } from './text';
 import type { Shared } from './memo';
-import { hasDate, secondsOf, type Span } from './time';
+import { hasDate, isoText, type Span } from './time';
 import type { Catalogue } from './sensors';
 import { toShown } from './format';
-import { type Missing, missingOf, spanOfWire } from './timeline';
+import { type Missing, missingOf } from './timeline';
 
 /** A reading, or all finite readings of a bucket. */
 export interface Point {
@@ -33,23 +33,19 @@ export const readingAt = (at: number, value: number | null): Point => ({
 
 /** The received series; `nowS` is the twin's time, ROS seconds. */
 export const seriesOf = (wire: History, nowS: number) => ({
-  ...spanOfWire(wire),
+  ...{ from: wire.from, to: wire.to },
   tagId: wire.tag_id,
   sensor: wire.sensor_type,
   /** Width of a bucket, seconds; null: these are readings. */
   bucketS: wire.bucket_s,
   /** By their time. */
   points: [
-    ...wire.readings.map(({ stamp, value }) => readingAt(secondsOf(stamp), value)),
-    ...wire.buckets.map(({ start, mean, ...rest }) => ({
-      ...rest,
-      at: secondsOf(start),
-      value: mean,
-    })),
+    ...wire.readings.map(({ stamp, value }) => readingAt(stamp, value)),
+    ...wire.buckets.map(({ start, mean, ...rest }) => ({ ...rest, at: start, value: mean })),
   ] as readonly Point[],
-  gaps: wire.gaps.map(spanOfWire),
+  gaps: wire.gaps,
   /** When it was night by the clock; null: the clock does not decide. */
-  nights: wire.nights?.map(spanOfWire) ?? null,
+  nights: wire.nights,
   missing: missingOf(wire, nowS),
 });
 
@@ -70,9 +66,7 @@ export const marksOf = ({ buckets, bucket_s: widthS }: Timeline) =>
     [
       { kind: 'failure' as const, count: failures },
       { kind: 'inspection' as const, count: looks },
-    ].flatMap(({ kind, count }) =>
-      count > 0 ? [{ at: secondsOf(start), widthS, kind, count }] : [],
-    ),
+    ].flatMap(({ kind, count }) => (count > 0 ? [{ at: start, widthS, kind, count }] : [])),
   );
 
 /** Where a point is drawn: a bucket at its middle, but never after the series' end. */
@@ -139,7 +133,7 @@ export function chartCsv(
     const shown = (value: number | null): Cell =>
       value === null ? null : Number(toShown(sensor, value).toPrecision(12));
     return rowsOfSeries(series, marks).map(({ kind, at, to, n, value, min, max }): Cell[] => [
-      hasDate(at) ? new Date(at * 1000).toISOString() : null,
+      hasDate(at) ? isoText(at) : null,
       Number(at.toFixed(6)),
       to && Number(to.toFixed(6)),
       ...[series.tagId, series.sensor, sensor.unit, kind, n],

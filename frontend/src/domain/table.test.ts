@@ -12,7 +12,7 @@ const tags = [
     tag_id: '2',
     readings: readings({ temperature: 20 }),
     species: 'rose',
-    last_observed: { sec: 100, nanosec: 250_000_000 },
+    last_observed: 100.25,
   }),
   tag({ tag_id: '10', readings: readings({ temperature: 35 }), anomaly: true, bug_count: 3 }),
   tag({
@@ -24,7 +24,7 @@ const tags = [
   tag({
     tag_id: '1',
     stale_seconds: null,
-    last_observed: { sec: 0, nanosec: 0 },
+    last_observed: 0,
     pose: { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 0 } },
   }),
 ];

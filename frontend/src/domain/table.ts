@@ -1,7 +1,7 @@
 /** Rows of the table: columns, sorting, filter. */
-import type { TagHealth, Verdict, WireTime } from '../contract/types';
+import type { TagHealth, Verdict } from '../contract/types';
 import { S } from '../strings';
-import { ageSeconds } from './time';
+import { ageSeconds, isoText } from './time';
 import { type Cell, csv, finder } from './text';
 import { type HouseHealth, reasonsText, severity, attemptOutcome } from './health';
 import { groupedBy, memoLast, memoOne } from './memo';
@@ -133,12 +133,6 @@ function haystackOf(tag: Tag, health: TagHealth, sensors: Catalogue): string {
     .toLowerCase();
 }
 
-/** ISO 8601, on the twin's clock: the same ROS time as in a bag; null: never. */
-function observedText({ sec, nanosec }: WireTime): string | null {
-  if (sec === 0 && nanosec === 0) return null;
-  return new Date(sec * 1000 + Math.floor(nanosec / 1e6)).toISOString();
-}
-
 /**
  * The table as a file: raw values at full precision, in the units that the page shows. For programs,
  * column names and number formats are the same in every language.
@@ -177,7 +171,7 @@ export function tableCsv(
       tag.bugCount,
       tag.anomaly ? 'yes' : 'no',
       age === null ? null : Math.round(age),
-      observedText(tag.wire.last_observed),
+      tag.wire.last_observed === 0 ? null : isoText(tag.wire.last_observed),
       place && round(place.x),
       place && round(place.y),
     ];

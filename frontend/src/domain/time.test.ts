@@ -7,7 +7,6 @@ import {
   hasDate,
   PERIOD_KINDS,
   rosText,
-  secondsOf,
   shortRosText,
   spanOf,
 } from './time';
@@ -59,10 +58,6 @@ test('a simulation that counts from its beginning has no dates', () => {
   expect(rosText(0)).toBe('sim 00:00:00');
   expect(rosText(360_000)).toBe('sim 100:00:00');
   expect([999_999_999, 1_000_000_000].map(hasDate)).toEqual([false, true]);
-});
-
-test('a stamp in seconds', () => {
-  expect(secondsOf({ sec: 12, nanosec: 250_000_000 })).toBe(12.25);
 });
 
 const NOW = 1_794_000_000;

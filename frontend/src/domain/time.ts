@@ -1,4 +1,3 @@
-import type { WireTime } from '../contract/types';
 import { LOCALE } from '../strings';
 import { clockText } from './format';
 
@@ -37,7 +36,8 @@ const FIRST_DATE_S = 1e9;
 
 export const hasDate = (at: number): boolean => at >= FIRST_DATE_S;
 
-export const secondsOf = ({ sec, nanosec }: WireTime): number => sec + nanosec / 1e9;
+/** ISO 8601, for programs: the same ROS time as in a bag. */
+export const isoText = (at: number): string => new Date(Math.round(at * 1000)).toISOString();
 
 const date = new Intl.DateTimeFormat(LOCALE, { day: 'numeric', month: 'short', year: 'numeric' });
 

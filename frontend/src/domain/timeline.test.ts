@@ -1,16 +1,16 @@
 import { describe, expect, test, vi } from 'vitest';
 
-import { wireStretch, wireTime, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { missingOf, tickStep, timelineOf, timeTicks } from './timeline';
 
-test('a timeline has its times in seconds', () => {
+test('a timeline says what it lacks', () => {
   const wire = wireTimeline({
     from: 100,
     to: 340,
-    reach: wireStretch(20, 340.5),
+    reach: { from: 20, to: 340.5 },
     buckets: [
       {
-        start: wireTime(101.5),
+        start: 101.5,
         scans: 5,
         failures: 1,
         looks: 2,
@@ -18,17 +18,17 @@ test('a timeline has its times in seconds', () => {
         pests_cleared: 4,
       },
     ],
-    silences: [wireStretch(110, 120)],
-    runs: [{ ...wireStretch(20, 340), is_simulated: true }],
+    silences: [{ from: 110, to: 120 }],
+    runs: [{ from: 20, to: 340, is_simulated: true }],
   });
-  expect(timelineOf({ ...wire, kept_from: wireTime(105) }, 400)).toEqual({
+  expect(timelineOf({ ...wire, kept_from: 105 }, 400)).toEqual({
     from: 100,
     to: 340,
     bucketS: 1,
     reach: { from: 20, to: 340.5 },
     buckets: [{ start: 101.5, scans: 5, failures: 1, looks: 2, pests_seen: 3, pests_cleared: 4 }],
     silences: [{ from: 110, to: 120 }],
-    runs: [{ from: 20, to: 340 }],
+    runs: [{ from: 20, to: 340, is_simulated: true }],
     missing: [{ from: 100, to: 105, why: 'not_kept' }],
   });
   expect(timelineOf({ ...wire, reach: null }, 400).reach).toBeNull();
@@ -38,10 +38,10 @@ const reported = (
   keptFrom: number | null,
   completeTo: number | null,
 ): Parameters<typeof missingOf>[0] => ({
-  from: wireTime(100),
-  to: wireTime(200),
-  kept_from: keptFrom === null ? null : wireTime(keptFrom),
-  complete_to: completeTo === null ? null : wireTime(completeTo),
+  from: 100,
+  to: 200,
+  kept_from: keptFrom,
+  complete_to: completeTo,
 });
 
 test('what is kept and complete, or of which nobody knows, misses nothing', () => {

@@ -3,30 +3,25 @@ import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
 import { clockText, minuteText } from './format';
 import type { Shared } from './memo';
-import { countText, dayFormat, secondsOf, type Span } from './time';
+import { countText, dayFormat, type Span } from './time';
 
 export type Timeline = Shared<ReturnType<typeof timelineOf>>;
 
-export const spanOfWire = ({ from, to }: WireTimeline['silences'][number]): Span => ({
-  from: secondsOf(from),
-  to: secondsOf(to),
-});
-
 /** `nowS`: the twin's time of the answer, ROS seconds. */
-export function timelineOf(wire: WireTimeline, nowS: number) {
-  return {
-    ...spanOfWire(wire),
-    bucketS: wire.bucket_s,
-    /** The span of the whole history; null: none yet. */
-    reach: wire.reach && spanOfWire(wire.reach),
-    /** Sorted by time, without empty buckets. */
-    buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
-    silences: wire.silences.map(spanOfWire),
-    /** From each start of the twin's clock to the next: it may begin anew. */
-    runs: wire.runs.map(spanOfWire),
-    missing: missingOf(wire, nowS),
-  };
-}
+export const timelineOf = (
+  { from, to, bucket_s: bucketS, ...wire }: WireTimeline,
+  nowS: number,
+) => ({
+  ...{ from, to, bucketS },
+  /** The span of the whole history; null: none yet. */
+  reach: wire.reach,
+  /** Sorted by time, without empty buckets. */
+  buckets: wire.buckets,
+  silences: wire.silences,
+  /** From each start of the twin's clock to the next: it may begin anew. */
+  runs: wire.runs as readonly Span[],
+  missing: missingOf({ from, to, ...wire }, nowS),
+});
 
 /** A span in which data may have been received that the answer lacks; not a silence. */
 export interface Missing extends Span {
@@ -41,10 +36,10 @@ export function missingOf(
   wire: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
   nowS: number,
 ): readonly Missing[] {
-  const [from, to] = [secondsOf(wire.from), Math.min(secondsOf(wire.to), nowS)];
+  const [from, to] = [wire.from, Math.min(wire.to, nowS)];
   const missing: Missing[] = [];
-  if (wire.kept_from) missing.push({ from, to: secondsOf(wire.kept_from), why: 'not_kept' });
-  const complete = wire.complete_to && secondsOf(wire.complete_to);
+  if (wire.kept_from !== null) missing.push({ from, to: wire.kept_from, why: 'not_kept' });
+  const complete = wire.complete_to;
   if (complete !== null && to - complete > SLACK_S) {
     missing.push({ from: Math.max(from, complete), to, why: 'not_recorded' });
   }

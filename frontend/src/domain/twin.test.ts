@@ -145,8 +145,8 @@ describe('times of their own', () => {
 
   test('inspection and attempt have their own times; a success has no failed attempt', () => {
     const wire = wireTag({
-      looked_at: { sec: 4_990, nanosec: 500_000_000 },
-      last_try: { sec: 4_880, nanosec: 0 },
+      looked_at: 4_990.5,
+      last_try: 4_880,
       last_try_status: 2,
       last_try_detail: 'dark',
     });

@@ -1,7 +1,7 @@
-import type { Latest, TagHealth, TwinTagState, WirePoint, WireTime } from '../contract/types';
+import type { Latest, TagHealth, TwinTagState, WirePoint } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { Shared } from './memo';
-import { secondsOf, type When } from './time';
+import type { When } from './time';
 
 export interface FailedAttempt {
   readonly at: When;
@@ -18,8 +18,8 @@ export interface Snapshot {
   readonly tags: readonly Tag[];
   /** Changes exactly when a field or the map may have changed. */
   readonly revision: string;
-  /** ROS time of the state. */
-  readonly at: WireTime;
+  /** Time of the state, ROS seconds. */
+  readonly at: number;
   /** When this state was new, ms on the browser's monotonic clock. */
   readonly takenAt: number;
   /** Whether it is complete; else the journal lacks data of that time. */
@@ -45,7 +45,7 @@ export function tagOf(wire: TwinTagState, judged?: TagHealth) {
     wire.readings.map(({ name, observed_at: at }): [string, When] => [
       name,
       // Without the tag's age, the ages of its readings are unknown.
-      isObserved && at ? secondsOf(at) : 'unknown',
+      isObserved && at !== null ? at : 'unknown',
     ]),
   );
   const { looked_at: inspected, last_try: attempted, last_try_status: status } = wire;
@@ -64,12 +64,12 @@ export function tagOf(wire: TwinTagState, judged?: TagHealth) {
     /** When the newest reading was taken. */
     scannedAt: newest(readAt.values()),
     /** When the flowers were last inspected; "never" also if the twin does not report it. */
-    inspectedAt: (inspected === null ? 'never' : secondsOf(inspected)) as When,
+    inspectedAt: (inspected ?? 'never') as When,
     /** The last scan or inspection, if it failed. */
     failedAttempt:
       attempted === null || status === null || status === 0
         ? null
-        : ({ at: secondsOf(attempted), status, detail: wire.last_try_detail } as FailedAttempt),
+        : ({ at: attempted, status, detail: wire.last_try_detail } as FailedAttempt),
     /** Whether it was ever observed, with a known age. */
     isObserved,
     species: wire.species,
@@ -131,7 +131,7 @@ export function equal(a: unknown, b: unknown): boolean {
  */
 export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot | null): Snapshot {
   const at = latest.state.header.stamp;
-  const isRepeated = before !== null && equal(before.at, at);
+  const isRepeated = before?.at === at;
   const takenAt = isRepeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
   const judged = latest.health.tags;

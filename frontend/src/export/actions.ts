@@ -4,7 +4,7 @@ import { differenceText, signedText } from '../domain/difference';
 import { errorNumber, readingText, valueText, withUnit } from '../domain/format';
 import { tableCsv } from '../domain/table';
 import { shown } from '../domain/text';
-import { dateText, rosText, secondsOf, type Span, spanOf } from '../domain/time';
+import { dateText, rosText, type Span, spanOf } from '../domain/time';
 import { contextOf, newCanvas } from '../draw/surface';
 import { toFragment } from '../store/address';
 import { type AppState, store } from '../store/app';
@@ -31,7 +31,7 @@ export function saveTable(): void {
     selectRows(state),
     selectCatalogue(state),
     selectColumns(state),
-    secondsOf(snapshot.at),
+    snapshot.at,
   );
   saveCsv('tags', text, epochOf(snapshot.takenAt), moment);
 }
@@ -52,7 +52,7 @@ export async function saveMap(): Promise<void> {
 
   const takenAt = epochOf(snapshot.takenAt);
   // A recording or simulation has its own time: use that, not when the data arrived.
-  const then = moment ?? (selectHasOwnTime(state) ? secondsOf(snapshot.at) : null);
+  const then = moment ?? (selectHasOwnTime(state) ? snapshot.at : null);
   const { difference } = selectHeat(state) ?? {};
   const time = difference
     ? S.differenceTimes(rosText(difference.at), rosText(difference.against))

@@ -13,7 +13,7 @@ vi.mock('./useAnswer', async (original) => ({
   useSensors: () => CATALOGUE,
 }));
 
-const at = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
+const at = (sec: number): number => sec;
 const read = (value: number, sec: number) => ({
   ...{ value, verdict: 'critical', reason: null, observed_at: at(sec) },
 });

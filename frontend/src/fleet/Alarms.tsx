@@ -6,12 +6,11 @@ import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
 import { changeOf, hourText, type Taken } from '../domain/difference';
 import type { Catalogue } from '../domain/sensors';
-import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { Trend } from '../ui/Trend';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
+import { alarmCount, namesOf, type Site, siteLink, timeText, words } from './sites';
 import { useAnswer, useSensors } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
@@ -80,14 +79,13 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
 }
 
 function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.Element {
-  const raised = secondsOf(alarm.raised_at);
   const state = alarm.is_live && alarm.now ? alarm.now : null;
   const trend = state && trendOf(state, alarm.hour_ago);
   const values = valuesOf(alarm, sensors, state && { kind: 'known', trend, ...state });
   const { verdict } = alarm.now ?? alarm.reason;
   return (
     <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>
-      <a href={linkOf(alarm, raised)}>
+      <a href={linkOf(alarm)}>
         <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
         <strong className="fleet-alarm-site">{alarm.name}</strong>
         <span>{whereText(alarm)}</span>
@@ -109,7 +107,7 @@ function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.
           )}
         </span>
         <span className="fleet-line">
-          {S.alarmSince(whenText(raised, timeOfDay() / 1000))}
+          {S.alarmSince(whenText(alarm.raised_at, timeOfDay() / 1000))}
           {!alarm.is_live && ` (${W.wasLive})`}
           {saidOf(alarm).map((said) => (
             <span key={said} className="fleet-alarm-status">
@@ -135,14 +133,16 @@ function trendOf(now: Reported, then?: Reported | null): number | null {
 function saidOf(alarm: SiteAlarm): readonly string[] {
   const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
   return [
-    ...(by && at ? [W.acknowledged(by, timeText(ms(at)))] : []),
-    ...(who && until ? [S.alarmShelved(timeText(ms(until)), alarm.shelved_reason ?? '', who)] : []),
+    ...(by && at != null ? [W.acknowledged(by, timeText(at))] : []),
+    ...(who && until != null
+      ? [S.alarmShelved(timeText(until), alarm.shelved_reason ?? '', who)]
+      : []),
   ];
 }
 
-function linkOf(alarm: SiteAlarm, raised: number): string {
+function linkOf(alarm: SiteAlarm): string {
   // Rounded up, to include the observation.
-  const parts = new URLSearchParams({ at: String(Math.ceil(raised * 1000) / 1000) });
+  const parts = new URLSearchParams({ at: String(Math.ceil(alarm.raised_at * 1000) / 1000) });
   if (alarm.tag_id) parts.set('tag', alarm.tag_id);
   return `${siteLink(alarm)}#${parts.toString()}`;
 }

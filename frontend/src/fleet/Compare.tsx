@@ -10,11 +10,10 @@ import { usePlot } from '../charts/plot';
 import { timeOfDay } from '../clock';
 import { differenceNumber, readingText, withUnit } from '../domain/format';
 import { isMeasured, type Sensor } from '../domain/sensors';
-import { spanOf as periodSpan, rosText, secondsOf, type Span } from '../domain/time';
+import { spanOf, rosText, type Span } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { Select } from '../widgets/controls';
 import { VIEW_WORDS } from '../words/fleetViews';
-import type { WireTime } from '../contract/types';
 import { Choice } from './Choice';
 import { type Site, siteLink, words } from './sites';
 import { useAnswer, useSensors } from './useAnswer';
@@ -39,7 +38,7 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
   // Sorted by name, so that a new worst site does not change the query.
   const sites = compared.map(({ site }) => site).sort();
   const hour = Math.floor(timeOfDay() / 3_600_000) * 3600;
-  const { from } = periodSpan({ kind: period }, hour, null);
+  const { from } = spanOf({ kind: period }, hour, null);
   const path = `api/compare?sensor_type=${encodeURIComponent(name)}&from=${from}&sites=${sites.join(',')}`;
   const { value: found, message } = useAnswer<Compared>(path, ['sites', 'median'], EVERY_MS);
   const drawn = useMemo(
@@ -49,9 +48,9 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
   const model = useMemo(
     () =>
       found && {
-        ...{ sensor: sensors.named(found.sensor_type), span: spanOf(found), moment: null },
+        ...{ sensor: sensors.named(found.sensor_type), span: found, moment: null },
         isMixed: false,
-        bands: [{ ...spanOf(found), ranges: sensors.named(found.sensor_type) }],
+        bands: [{ ...found, ranges: sensors.named(found.sensor_type) }],
         lines: linesOf(found, drawn, W.median),
       },
     [found, drawn, sensors],
@@ -156,10 +155,9 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite): string {
   return withUnit(sensor, differenceNumber(sensor, deviation));
 }
 
-function onSystemTheme(listener: () => void): () => void {
+function onSystemTheme(listener: () => void, signal: AbortSignal): void {
   const system = window.matchMedia('(prefers-color-scheme: dark)');
-  system.addEventListener('change', listener);
-  return () => system.removeEventListener('change', listener);
+  system.addEventListener('change', listener, { signal });
 }
 
 function Chart({
@@ -196,10 +194,8 @@ interface ComparedSite {
 }
 
 /** `/api/compare`: the outlier first. */
-interface Compared {
+interface Compared extends Span {
   readonly sensor_type: string;
-  readonly from: WireTime;
-  readonly to: WireTime;
   readonly bucket_s: number;
   readonly low: Values;
   readonly median: Values;
@@ -229,28 +225,22 @@ function lineOf(
   look: number,
   ...[low, mean, high]: [low: Values, mean: Values, high: Values]
 ): Line {
-  const start = secondsOf(from);
   const points = mean.flatMap((value, index) => {
     const [min, max] = [low[index] ?? value, high[index] ?? value];
-    return value === null ? [] : [{ at: start + index * bucketS, value, min, max, n: 1 }];
+    return value === null ? [] : [{ at: from + index * bucketS, value, min, max, n: 1 }];
   });
   const gaps = mean.flatMap((value, index) =>
-    value === null ? [{ from: start + index * bucketS, to: start + (index + 1) * bucketS }] : [],
+    value === null ? [{ from: from + index * bucketS, to: from + (index + 1) * bucketS }] : [],
   );
   const series = {
-    ...{ from: start, to: secondsOf(to), tagId: label, sensor, bucketS },
+    ...{ from, to, tagId: label, sensor, bucketS },
     ...{ points, gaps, nights: null, missing: [] },
   };
   return { series, before: null, look, label, marks: [] };
 }
 
-const spanOf = ({ from, to }: Compared): Span => ({
-  from: secondsOf(from),
-  to: secondsOf(to),
-});
-
 /** A site's value in the bucket at a moment; without a moment, its mean. */
 function valueAt(found: Compared, { mean, means }: ComparedSite, at: number | null) {
   if (at === null) return mean;
-  return means[Math.floor((at - secondsOf(found.from)) / found.bucket_s)] ?? null;
+  return means[Math.floor((at - found.from) / found.bucket_s)] ?? null;
 }

@@ -36,7 +36,7 @@ test('of a silent greenhouse, and without a connection, nobody knows that there 
   expect(text(site({ active_alarms: null }))).not.toContain(words.noAlarms);
   // Nor why its status is unknown, unless its clock is ahead.
   const unknown = (ahead: number): Sites =>
-    site({ verdict: 'unknown', last_received: { sec: Date.now() / 1000 + ahead, nanosec: 0 } });
+    site({ verdict: 'unknown', last_received: Date.now() / 1000 + ahead });
   expect(text(unknown(700))).toContain(S.offlineWhy.clock_ahead);
   expect(text(unknown(500))).not.toContain(S.offlineWhy.clock_ahead);
 });

@@ -27,7 +27,6 @@ import {
   type Group,
   grouped,
   groupNames,
-  ms,
   type Site,
   siteLink,
   timeText,
@@ -151,10 +150,10 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
 /** The fewer greenhouses, the more each card shows. */
 const sizeOf = (count: number): string => (count <= 6 ? 'few' : count <= 24 ? 'some' : 'many');
 
-/** When all of it was last known, ms since the epoch; null: it is as of now. */
+/** When all of it was last known, seconds since the epoch; null: it is as of now. */
 function asOfWhen({ archive, lostAt }: Seen): number | null {
   if (lostAt !== null || !archive || archive.is_reachable) return lostAt;
-  return archive.since && ms(archive.since);
+  return archive.since;
 }
 
 function nothingText({ archive, sites }: Seen): string {
@@ -170,7 +169,7 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
   if (lostAt !== null) {
     text = words.disconnected(timeText(lostAt));
   } else if (archive && !archive.is_reachable) {
-    text = words.archiveDown(archive.since ? timeText(ms(archive.since)) : '–');
+    text = words.archiveDown(archive.since === null ? '–' : timeText(archive.since));
     detail = archive.message;
   }
   return (
@@ -187,10 +186,10 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
 }
 
 /** After this long without data, a greenhouse counts as silent, or the archive as down. */
-const LIVE_MS = 20_000;
+const LIVE_S = 20;
 
 interface Listed {
-  /** When all of it was last known, ms since the epoch; null: it is as of now. */
+  /** When all of it was last known, seconds since the epoch; null: it is as of now. */
   readonly asOf: number | null;
   /** null: not loaded yet. */
   readonly causeText: CauseText | null;
@@ -308,9 +307,9 @@ const SiteCard = memo(function SiteCard({
             })}
         </div>
         <span className="fleet-line">
-          {site.last_received
-            ? words.received(timeText(ms(site.last_received)))
-            : words.nothingReceived}
+          {site.last_received === null
+            ? words.nothingReceived
+            : words.received(timeText(site.last_received))}
         </span>
       </a>
     </li>
@@ -325,16 +324,16 @@ function originText({ origin }: Site): string | null {
 function silentText(site: Site, asOf: number | null): string {
   const at = site.heardAt;
   if (at === null) return words.silent;
-  const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
+  const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_S);
   return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }
 
-/** As in the fleet's judge, ms. */
-const MOST_AHEAD_MS = 600_000;
+/** As in the fleet's judge, seconds. */
+const MOST_AHEAD_S = 600;
 
 /** Its clock is ahead: that is why its status is unknown. */
 const isAhead = ({ verdict, last_received: at }: Site): boolean =>
-  verdict === 'unknown' && at !== null && ms(at) > timeOfDay() + MOST_AHEAD_MS;
+  verdict === 'unknown' && at !== null && at > timeOfDay() / 1000 + MOST_AHEAD_S;
 
 function countText(count: number | null): string {
   if (count === null) return words.alarmsBeingRead;

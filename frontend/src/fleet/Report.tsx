@@ -2,13 +2,13 @@
 import { useState, type JSX } from 'react';
 
 import { timeOfDay, timeZone } from '../clock';
-import type { Note, WireTime } from '../contract/types';
+import type { Note } from '../contract/types';
 import { numberText } from '../domain/format';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import { VIEW_WORDS } from '../words/fleetViews';
 import { Choice } from './Choice';
-import { ms, namesOf, type Site, timeText, words } from './sites';
+import { namesOf, type Site, timeText, words } from './sites';
 import { useAnswer } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -23,7 +23,7 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly name: string;
   readonly active_alarms: number | null;
   /** null: it has never sent anything. */
-  readonly complete_to: WireTime | null;
+  readonly complete_to: number | null;
   readonly report: string;
 }
 
@@ -102,7 +102,7 @@ function NoteRow({ note }: { note: SiteNote }): JSX.Element {
   const kindOf = kind === 'comment' ? '' : W.kinds[kind];
   return (
     <tr>
-      <td>{timeText(ms(at))}</td>
+      <td>{timeText(at)}</td>
       <th scope="row">{name}</th>
       <td>{by}</td>
       <td className="fleet-text">
@@ -132,7 +132,7 @@ function Row({ row, isLive }: { row: SiteReport; isLive: boolean }): JSX.Element
         {row.active_alarms ?? S.noValue}
         {!isLive && row.complete_to && ` (${W.wasLive})`}
       </td>
-      <td>{row.complete_to ? timeText(ms(row.complete_to)) : S.noValue}</td>
+      <td>{row.complete_to ? timeText(row.complete_to) : S.noValue}</td>
     </tr>
   );
 }

@@ -1,6 +1,7 @@
 import { afterEach, expect, test, vi } from 'vitest';
 
 import { follow } from './follow';
+import { started } from '../testing/life';
 
 class FakeSocket {
   static last: FakeSocket | null = null;
@@ -26,7 +27,9 @@ test('a page that wakes after a silence says so at once, not when its next attem
   vi.useFakeTimers();
   vi.stubGlobal('WebSocket', FakeSocket);
   const lost: boolean[] = [];
-  const stop = follow('ws://test/ws/sites', ({ lostAt }) => lost.push(lostAt !== null));
+  const stop = started((on) =>
+    follow('ws://test/ws/sites', ({ lostAt }) => lost.push(lostAt !== null), on),
+  );
   const archive = { is_reachable: true, message: '', since: null };
   const sites = { type: 'sites', is_whole: true, archive, sites: [], gone: [] };
   const receive = (): void => FakeSocket.last?.onmessage?.({ data: JSON.stringify(sites) });
@@ -50,7 +53,7 @@ test('a connection that is refused may be one of a session that has ended', () =
     requests.push(url.pathname);
     return Promise.resolve(new Response());
   });
-  const stop = follow('ws://test/ws/sites', () => undefined);
+  const stop = started((on) => follow('ws://test/ws/sites', () => undefined, on));
   FakeSocket.last?.onopen?.();
   FakeSocket.last?.onclose?.({ code: 1006 });
   expect(requests).toEqual([]);

@@ -1,18 +1,18 @@
 /** The overview as the server sends it, over one socket that reconnects. */
-import { epochOf, now, onLapse } from '../clock';
-import { connect, signInIfRequired } from '../connection/socket';
+import { epochOf, lapses, now } from '../clock';
+import { connect, type ConnectionHandlers, signInIfRequired } from '../connection/socket';
 import { parseSites, withFrame, type Archive, type Sites, type SitesFrame } from './sites';
 
 export interface Seen {
   readonly sites: Sites;
   /** null: nothing received yet. */
   readonly archive: Archive | null;
-  /** When data stopped arriving, ms since the epoch; null: they arrive. */
+  /** When data stopped arriving, seconds since the epoch; null: they arrive. */
   readonly lostAt: number | null;
 }
 
-/** Calls back with the full state on each change; returns a stop function. */
-export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
+/** Calls back with the full state on each change. */
+export function follow(url: string, onSeen: (seen: Seen) => void, signal: AbortSignal): void {
   let seen: Seen = { sites: new Map(), archive: null, lostAt: null };
   let receivedAt = now();
   const update = (news: Partial<Seen>): void => {
@@ -20,7 +20,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     onSeen(seen);
   };
   update({});
-  const link = connect<SitesFrame>(url, {
+  const handlers: ConnectionHandlers<SitesFrame> = {
     parse: (data) => {
       const frame = parseSites(data);
       return frame ? { kind: 'frame', frame } : { kind: 'passed over' };
@@ -28,7 +28,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     onConnection: ({ socket }) => {
       // Nothing is lost before anything came; after sleep or a silence, the attempt may take long to fail.
       const isLost = socket.kind === 'closed' || (socket.kind === 'opening' && seen.archive);
-      if (isLost && seen.lostAt === null) update({ lostAt: epochOf(receivedAt) });
+      if (isLost && seen.lostAt === null) update({ lostAt: epochOf(receivedAt) / 1000 });
     },
     onFrame: (frame) => {
       receivedAt = now();
@@ -39,11 +39,8 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     },
     // The server is unreachable, or the session has ended.
     onRefused: () => void signInIfRequired(),
-  });
-  // After sleep, the socket may be dead.
-  const stopLapse = onLapse(() => link.dispatch('start'));
-  return () => {
-    stopLapse();
-    link.stop();
   };
+  const link = connect(url, handlers, signal);
+  // After sleep, the socket may be dead.
+  lapses.addEventListener('lapse', () => link.dispatch('start'), { signal });
 }

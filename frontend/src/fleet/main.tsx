@@ -38,5 +38,5 @@ if (element) {
       </StrictMode>,
     );
   };
-  follow(address.href, show);
+  follow(address.href, show, new AbortController().signal);
 }

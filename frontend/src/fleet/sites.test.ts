@@ -20,7 +20,7 @@ const site = (name: string, more: Partial<Entry> = {}): Entry => ({
   verdict: 'healthy',
   last_verdict: 'healthy',
   active_alarms: 0,
-  last_received: { sec: 1_700_000_000, nanosec: 0 },
+  last_received: 1_700_000_000,
   lag_s: 0.5,
   is_live: true,
   origin: 'robot',

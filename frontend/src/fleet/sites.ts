@@ -1,6 +1,7 @@
 /** The server's data on all sites, and their order, groups and filter on the page. Pure. */
 import { timeOfDay } from '../clock';
-import type { HealthReason, Verdict, WireTime } from '../contract/types';
+import { inSeconds } from '../contract/stamps';
+import type { HealthReason, Verdict } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
 import { fleetWordsOf } from '../words/fleet';
@@ -15,7 +16,7 @@ interface SiteEntry {
   /** The last known verdict of a silent site; null: being computed. */
   readonly last_verdict: Verdict | null;
   readonly active_alarms: number | null;
-  readonly last_received: WireTime | null;
+  readonly last_received: number | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
   readonly origin: string;
@@ -26,7 +27,7 @@ interface SiteEntry {
 }
 
 export type Site = Omit<SiteEntry, 'lag_s'> & {
-  /** When its forwarder last confirmed, ms since the epoch, to the second; null: never. */
+  /** When its forwarder last confirmed, seconds since the epoch; null: never. */
   readonly heardAt: number | null;
 };
 
@@ -42,7 +43,7 @@ export interface Cause {
 export interface Archive {
   readonly is_reachable: boolean;
   readonly message: string;
-  readonly since: WireTime | null;
+  readonly since: number | null;
 }
 
 export interface SitesFrame {
@@ -74,7 +75,7 @@ const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'health
 /** null: no frame of the overview. */
 export function parseSites(data: unknown): SitesFrame | null {
   try {
-    const frame = JSON.parse(String(data)) as SitesFrame | { readonly type: '' };
+    const frame = inSeconds(JSON.parse(String(data))) as SitesFrame | { readonly type: '' };
     return frame.type === 'sites' ? frame : null;
   } catch {
     return null;
@@ -86,7 +87,7 @@ export function withFrame(before: Sites, frame: SitesFrame): Sites {
   for (const name of frame.gone) sites.delete(name);
   // An entry comes only when it changes: its lag is that of now only here.
   for (const { lag_s: lag, ...site } of frame.sites) {
-    const heardAt = lag === null ? null : Math.round((timeOfDay() - lag * 1000) / 1000) * 1000;
+    const heardAt = lag === null ? null : Math.round(timeOfDay() / 1000 - lag);
     sites.set(site.site, { ...site, heardAt });
   }
   return sites;
@@ -160,11 +161,10 @@ export function chosen(sites: Sites, filter: Filter, search: string, group = '')
 
 const clockTime = new Intl.DateTimeFormat(LOCALE, { timeStyle: 'medium' });
 const dateAndTime = new Intl.DateTimeFormat(LOCALE, { dateStyle: 'medium', timeStyle: 'short' });
-const DAY_MS = 86_400_000;
+const HALF_A_DAY_S = 43_200;
 
-/** Today only the time of day is shown. */
+/** A time, seconds since the epoch; today only the time of day is shown. */
 export function timeText(at: number): string {
-  return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
+  const isNear = Math.abs(timeOfDay() / 1000 - at) < HALF_A_DAY_S;
+  return (isNear ? clockTime : dateAndTime).format(at * 1000);
 }
-
-export const ms = ({ sec, nanosec }: WireTime): number => sec * 1000 + nanosec / 1e6;

@@ -60,9 +60,9 @@ test('yaw of a quaternion about z', () => {
 
 test('placement of an occupancy grid', () => {
   const placement = mapPlacement({
-    header: { stamp: { sec: 0, nanosec: 0 }, frame_id: 'map' },
+    header: { stamp: 0, frame_id: 'map' },
     info: {
-      map_load_time: { sec: 0, nanosec: 0 },
+      map_load_time: 0,
       resolution: 0.05,
       width: 80,
       height: 160,

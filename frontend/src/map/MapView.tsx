@@ -16,7 +16,9 @@ export function MapView({ kiosk }: { kiosk: boolean }): JSX.Element {
     if (!element.current || !still.current || !pins.current || !overlay.current) return undefined;
     const canvases = { still: still.current, pins: pins.current, overlay: overlay.current };
     const onFailure = (error: unknown): void => setFailure({ error });
-    return runMap(element.current, canvases, kiosk, onFailure);
+    const gone = new AbortController();
+    runMap(element.current, canvases, kiosk, onFailure, gone.signal);
+    return () => gone.abort();
   }, [kiosk]);
   return (
     <div

@@ -5,6 +5,7 @@ import { corners, type MapPoint, mapPoint, toCanvas, type Camera } from '../geom
 import { act, moveViewport, NO_VIEWPORT, onChange, store, type Viewport } from '../store/app';
 import { MapCamera } from './camera';
 import { startGestures } from './gestures';
+import { started } from '../testing/life';
 
 const size = { width: 600, height: 400 };
 const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
@@ -23,12 +24,13 @@ beforeEach(() => {
   onView = vi.fn<() => void>();
   onCamera = vi.fn<(camera: Camera | null) => void>();
   stops = [
-    onChange((state) => [state.viewport.view], onView),
-    onChange(
-      ({ view }) => [view.camera],
-      () => {
-        onCamera(store.get().view.camera);
-      },
+    started((on) => onChange((state) => [state.viewport.view], onView, on)),
+    started((on) =>
+      onChange(
+        ({ view }) => [view.camera],
+        () => onCamera(store.get().view.camera),
+        on,
+      ),
     ),
   ];
   element = document.createElement('div');

@@ -21,7 +21,7 @@ import {
   viewOf,
 } from '../geometry/coordinates';
 import { act, moveViewport, store } from '../store/app';
-import { createStore } from '../store/create';
+import { createStore, PAGE } from '../store/create';
 import type { House } from '../store/twin';
 
 export interface Hand {
@@ -60,7 +60,6 @@ const viewport = () => store.get().viewport;
 /** Fits the view, follows links, and executes moves; the store has the result. */
 export class MapCamera {
   #hand: Hand | null = null;
-  readonly #stop: () => void;
   /** The view at the start of the current gestures. */
   #held: View | null = null;
   /** What moves must keep in sight; null: not known yet. */
@@ -68,7 +67,7 @@ export class MapCamera {
   #leastScale = MIN_SCALE;
 
   /** `isFixed`: only the program moves it, not wheel, finger or mouse. */
-  constructor(element: HTMLElement, isFixed = false) {
+  constructor(element: HTMLElement, isFixed = false, signal = PAGE) {
     const take = (): void => {
       const start = gestures.get();
       if (isFixed || !start || this.#hand) return;
@@ -87,7 +86,8 @@ export class MapCamera {
         },
       });
     };
-    this.#stop = gestures.subscribe(take);
+    gestures.subscribe(take, signal);
+    signal.addEventListener('abort', () => this.#hand?.stop());
     take();
   }
 
@@ -160,11 +160,6 @@ export class MapCamera {
     if (width === 0 || (isInside && isClear(view, point, covered))) return;
     this.#step({ ...view, x: view.x + width / 2 - x, y: view.y + height / 2 - y });
   }
-
-  destroy(): void {
-    this.#stop();
-    this.#hand?.stop();
-  }
 }
 
 export interface Content {
@@ -216,11 +211,15 @@ export function coveredBoxes(element: HTMLElement): Box[] {
   });
 }
 
-/** Calls back when an element over the map may have changed its size; returns a stop function. */
-export function watchCovered(element: HTMLElement, onChange: () => void): () => void {
+/** Calls back when an element over the map may have changed its size. */
+export function watchCovered(
+  element: HTMLElement,
+  onChange: () => void,
+  signal: AbortSignal,
+): void {
   const observer = new ResizeObserver(onChange);
   for (const each of element.parentElement?.querySelectorAll('.map-controls, .map-foot') ?? []) {
     observer.observe(each);
   }
-  return () => observer.disconnect();
+  signal.addEventListener('abort', () => observer.disconnect());
 }

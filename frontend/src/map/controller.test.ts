@@ -5,6 +5,7 @@ import { act, receive, store } from '../store/app';
 import { withField, withState } from '../store/twin';
 import { withLayer } from '../store/view';
 import { NOTHING } from '../store/fetcher';
+import { started } from '../testing/life';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -27,7 +28,7 @@ const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof w
   wireTag({
     tag_id: id,
     pose: { position: { x, y, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-    last_observed: { sec, nanosec: 0 },
+    last_observed: sec,
     readings: readings({ temperature: 20 }),
   });
 
@@ -36,7 +37,7 @@ const start = (isFixed = false): void => {
   overlay = canvas();
   pins = canvas();
   still = canvas();
-  stop = runMap(element, { still, pins, overlay }, isFixed, fail);
+  stop = started((on) => runMap(element, { still, pins, overlay }, isFixed, fail, on));
   paint();
 };
 /** Runs the callbacks of the next frame. */
@@ -240,7 +241,7 @@ test('everything is in sight, the heat map too', () => {
 
 test('a map of another size is drawn at once, and not empty for a frame', () => {
   const still = document.createElement('canvas');
-  stop = runMap(element, { still, pins, overlay }, false, fail);
+  stop = started((on) => runMap(element, { still, pins, overlay }, false, fail, on));
   expect(FakeContext.recordOf(still)?.named('clearRect').length).toBeGreaterThan(0);
 });
 
@@ -279,7 +280,7 @@ describe('nothing is drawn anew but what changed', () => {
     start();
     const { snapshot } = store.get().twin.latest;
     const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));
-    const later = { sec: (snapshot?.at.sec ?? 0) + 1, revision: snapshot?.revision ?? '' };
+    const later = { sec: (snapshot?.at ?? 0) + 1, revision: snapshot?.revision ?? '' };
     receive(withState(stateFrame(tags, later), performance.now() + 1_000));
     expect(store.get().twin.latest.snapshot).not.toBe(snapshot);
     expect(frames).toEqual([]);

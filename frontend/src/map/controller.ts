@@ -46,7 +46,8 @@ export function runMap(
   canvases: Canvases,
   isFixed: boolean,
   onFailure: (error: unknown) => void,
-): () => void {
+  signal: AbortSignal,
+): void {
   const guarded = (work: () => void) => (): void => {
     try {
       work();
@@ -63,7 +64,7 @@ export function runMap(
   let drawn = store.get();
   let lastField = selectShown(drawn).field.value;
 
-  const camera = new MapCamera(element, isFixed);
+  const camera = new MapCamera(element, isFixed, signal);
 
   const publish = ({ x, y, scale }: View): void => {
     canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
@@ -286,16 +287,14 @@ export function runMap(
     paint();
   });
   resize.observe(element);
-  const unwatch = watchCovered(element, () => {
+  const onCovered = (): void => {
     const before = covered;
     covered = coveredBoxes(element);
     if (JSON.stringify(before) === JSON.stringify(covered)) return;
     goToContent();
     spoil('pins');
-  });
-
-  const gone = new AbortController();
-  const { signal } = gone;
+  };
+  watchCovered(element, onCovered, signal);
 
   // Pins fade even if nothing arrives, so redraw them regularly.
   const fading = setInterval(() => {
@@ -311,17 +310,15 @@ export function runMap(
     { signal },
   );
 
-  const stops = [
-    store.subscribe(guarded(update)),
-    marksOnMap.subscribe(() => spoil('pins')),
-    onThemeChange(() => {
-      painter.recolour();
-      spoil('still', 'pins', 'overlay');
-      // Not in the next frame: a page being printed gets none.
-      cancelAnimationFrame(frame);
-      if (store.get().viewport.size.width > 0) paint();
-    }),
-  ];
+  store.subscribe(guarded(update), signal);
+  marksOnMap.subscribe(() => spoil('pins'), signal);
+  onThemeChange(() => {
+    painter.recolour();
+    spoil('still', 'pins', 'overlay');
+    // Not in the next frame: a page being printed gets none.
+    cancelAnimationFrame(frame);
+    if (store.get().viewport.size.width > 0) paint();
+  }, signal);
   element.addEventListener('pointermove', onPointerMove, { signal });
   element.addEventListener('pointerleave', onPointerLeave, { signal });
   if (!isFixed) {
@@ -330,14 +327,10 @@ export function runMap(
     element.addEventListener('blur', onBlur, { signal });
     element.addEventListener('keydown', onKeyDown, { signal });
   }
-  return () => {
-    for (const stop of stops) stop();
+  signal.addEventListener('abort', () => {
     theMap.set(null);
-    gone.abort();
     resize.disconnect();
-    unwatch();
     clearInterval(fading);
     cancelAnimationFrame(frame);
-    camera.destroy();
-  };
+  });
 }

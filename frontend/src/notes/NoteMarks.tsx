@@ -4,9 +4,9 @@ import { type JSX, useMemo } from 'react';
 import { fetchNotes } from '../contract/people';
 import type { Alarm, Note } from '../contract/types';
 import { shown } from '../domain/text';
-import { rosText, secondsOf, type Span } from '../domain/time';
+import { rosText, type Span } from '../domain/time';
 import { act, keepFetched, useApp } from '../store/app';
-import { createStore, useSelected } from '../store/create';
+import { createStore, PAGE, useSelected } from '../store/create';
 import { LANGUAGE, S } from '../strings';
 import { NOTES } from '../words/notes';
 
@@ -21,16 +21,16 @@ export const standing = (notes: readonly Note[]) =>
     .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
       ...{ id, kind, subject, by, text: text.replace(/\s+/g, ' ') },
       /** The time that the note is about, ROS seconds. */
-      at: secondsOf((kind === 'comment' ? until : null) ?? made),
+      at: (kind === 'comment' ? until : null) ?? made,
       /** End of a `shelve`, ROS seconds; null: the alarm was unshelved. */
-      until: until && secondsOf(until),
+      until,
     }))
     .reverse()
     .sort((one, other) => one.at - other.at);
 
 const PACE_MS = 500;
 
-export const startNotes = (): (() => void) =>
+export const startNotes = (signal = PAGE): void =>
   keepFetched<readonly Note[]>(
     {
       paceMs: PACE_MS,
@@ -39,6 +39,7 @@ export const startNotes = (): (() => void) =>
     ({ twin: { alarms, connection } }) =>
       // A journal without notes needs no request.
       alarms?.notes ? { key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes } : undefined,
+    signal,
   );
 
 /** Marks closer than this share of the span would overlap. */

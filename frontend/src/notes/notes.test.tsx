@@ -4,6 +4,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 import type { Note } from '../contract/types';
 import { act, receive } from '../store/app';
 import { person } from '../store/create';
+import { started } from '../testing/life';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { clustersOf, NoteMarks, standing, standingNotes, startNotes } from './NoteMarks';
@@ -15,7 +16,7 @@ const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
   subject: 'tag:7',
   text: id,
   until: null,
-  made_at: { sec: made, nanosec: 0 },
+  made_at: made,
   by: 'anna',
   withdrawn_by: null,
   withdrawn_at: null,
@@ -53,7 +54,7 @@ const report = (count: number): void => {
 };
 
 test('a comment stands where it is about, until it is withdrawn', () => {
-  const then = said('then', 900, { until: { sec: 100, nanosec: 0 }, text: 'two\nlines' });
+  const then = said('then', 900, { until: 100, text: 'two\nlines' });
   const gone = said('gone', 950, { withdrawn_by: 'anna' });
   expect(standing([gone, then, said('now', 800)])).toEqual([
     expect.objectContaining({ id: 'then', text: 'two lines', by: 'anna', at: 100 }),
@@ -71,7 +72,7 @@ test('marks that would cover each other are one, and those outside of the span n
 });
 
 test('comments are fetched when their number grows, and shown with name and time', async () => {
-  const stop = startNotes();
+  const stop = started(startNotes);
   render(<Comments subject="tag:7" name="Tag 7" />);
   report(0);
   expect(requests).toEqual([]);
@@ -180,7 +181,7 @@ test('a mark has who acknowledged or shelved an alarm when; the card lists comme
   standingNotes.set(
     standing([
       said('c', 900, { kind: 'shelve', subject, text: '' }),
-      said('b', 500, { kind: 'shelve', subject, text: 'vents', until: { sec: 900, nanosec: 0 } }),
+      said('b', 500, { kind: 'shelve', subject, text: 'vents', until: 900 }),
       said('a', 90, { kind: 'acknowledge', subject, text: '' }),
     ]),
   );

@@ -15,7 +15,6 @@ import { judgement, reason } from '../testing/health';
 import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { wireTime } from '../testing/timeline';
 import { Legend } from '../ui/Legend';
 import { Readout } from '../ui/MapPanel';
 import {
@@ -31,9 +30,9 @@ import {
 type Expected = Schemas['ExpectedReading'];
 
 const grade = (over: Partial<Grade> = {}): Grade => ({
-  fitted_at: wireTime(1_000),
+  fitted_at: 1_000,
   fit_problem: '',
-  graded_since: wireTime(500),
+  graded_since: 500,
   day: { scans: 458, inside: 412 },
   week: { scans: 3_200, inside: 2_900 },
   share_day: 412 / 458,
@@ -44,7 +43,7 @@ const grade = (over: Partial<Grade> = {}): Grade => ({
 
 const expectedReading = (over: Partial<Expected> = {}): Expected => ({
   measured: 22.4,
-  observed_at: wireTime(1_000),
+  observed_at: 1_000,
   expected: 22.1,
   expected_sd: 0.79,
   z: 0.4,

@@ -4,9 +4,9 @@ import { type JSX, type ReactPortal, useEffect, useState } from 'react';
 import { createPortal } from 'react-dom';
 
 import { answer } from '../contract/api';
-import type { Robot, RobotNow, WireTime } from '../contract/types';
+import type { Robot, RobotNow } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
-import { ageSeconds, ageStep, secondsOf } from '../domain/time';
+import { ageSeconds, ageStep } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
@@ -143,10 +143,8 @@ const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame ?? NOTHING);
 
 /** Age in seconds; null: unknown. */
-export function ageOf(stamp: WireTime, time: number | null): number | null {
-  const at = secondsOf(stamp);
-  return at === 0 ? null : ageSeconds(at, time);
-}
+export const ageOf = (at: number, time: number | null): number | null =>
+  at === 0 ? null : ageSeconds(at, time);
 
 /** Pause between attempts to fetch the trail, ms. */
 const PACE_MS = 5_000;
@@ -155,29 +153,28 @@ const PACE_MS = 5_000;
 function useTrail(): readonly Point[] {
   const [trail, setTrail] = useState<readonly Point[]>([]);
   useEffect(() => {
-    const stop = keepFetched<Robot>(
-      { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail.slice(-TRAIL_POINTS)) },
+    const gone = new AbortController();
+    keepFetched<Robot>(
+      { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail) },
       ({ twin }) =>
         twin.connection.socket.kind === 'open'
           ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
           : null,
+      gone.signal,
     );
-    const unsubscribe = robotFrame.subscribe(() => {
+    robotFrame.subscribe(() => {
       const position = robotFrame.get()?.position;
       if (position) setTrail((last) => extended(last, position));
-    });
-    return () => {
-      stop();
-      unsubscribe();
-    };
+    }, gone.signal);
+    return () => gone.abort();
   }, []);
   return trail;
 }
 
 type Point = Robot['trail'][number];
 
-/** About the last round: an hour of them would cover the heat map. */
-const TRAIL_POINTS = 50;
+/** Age of the oldest point, s. */
+const TRAIL_S = 3_600;
 /** Least distance between two points, as in the bridge, m. */
 const STEP_M = 0.1;
 /** The way between points farther apart is unknown, m. */
@@ -186,9 +183,9 @@ const GAP_M = 3;
 /** The trail with one more point; unchanged if that is too close. A clock that went back drops later ones. */
 export function extended(trail: readonly Point[], next: Point): readonly Point[] {
   const last = trail.at(-1);
-  const ageOfPoint = (it: Point): number => secondsOf(next.observed_at) - secondsOf(it.observed_at);
+  const ageOfPoint = (it: Point): number => next.observed_at - it.observed_at;
   if (last && ageOfPoint(last) >= 0 && apart(last, next) < STEP_M) return trail;
-  return [...trail.filter((it) => ageOfPoint(it) >= 0), next].slice(-TRAIL_POINTS);
+  return [...trail.filter((it) => ageOfPoint(it) >= 0 && ageOfPoint(it) <= TRAIL_S), next];
 }
 
 /** The trail as an SVG path in metres, with a break where the way is unknown. */

@@ -3,6 +3,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { fromFragment, type Linked, startAddress, toFragment } from './address';
 import { act, store } from './app';
 import { DEFAULT_LAYERS, DEFAULT_VIEW, LONGEST_FILTER, withLayer, withTag } from './view';
+import { started } from '../testing/life';
 
 let stop: () => void;
 
@@ -10,7 +11,7 @@ beforeEach(() => {
   vi.useFakeTimers();
   act(DEFAULT_VIEW);
   history.replaceState(null, '', '/?kiosk=1#sensor=co2&tag=7');
-  stop = startAddress();
+  stop = started((on) => startAddress(false, false, on));
 });
 afterEach(() => {
   stop();
@@ -47,13 +48,13 @@ test('the address follows the view once it has settled, and keeps the rest', () 
 test('a wall screen shows now, whatever moment its link holds', () => {
   stop();
   history.replaceState(null, '', '/?kiosk=1#at=77&sensor=co2');
-  stop = startAddress(true);
+  stop = started((on) => startAddress(true, false, on));
   expect(store.get().view).toMatchObject({ sensor: 'co2', moment: null });
 });
 
 test('where a round goes through the sensors only the rest comes back to the link', () => {
   stop();
-  stop = startAddress(true, true);
+  stop = started((on) => startAddress(true, true, on));
   // Changes of the sensor do not delay the return.
   for (const sensor of ['light', 'humidity', 'temperature']) {
     if (sensor === 'humidity') act(withLayer('grid', false));
@@ -67,7 +68,7 @@ test('where a round goes through the sensors only the rest comes back to the lin
 
 test('a wall screen chooses no tag, leaves its address alone, and comes back to it', () => {
   stop();
-  stop = startAddress(true);
+  stop = started((on) => startAddress(true, false, on));
   expect(store.get().view).toMatchObject({ sensor: 'co2', selected: null });
   act({ sensor: 'humidity' });
   vi.advanceTimersByTime(60_000);
@@ -100,7 +101,7 @@ describe('a card is a step of the browser’s history', () => {
     vi.useRealTimers();
     stop();
     history.replaceState(null, '', '/#sensor=co2');
-    stop = startAddress();
+    stop = started((on) => startAddress(false, false, on));
   });
 
   test('Back closes it and undoes nothing else; Forward opens it again', async () => {
@@ -187,7 +188,7 @@ describe('a card is a step of the browser’s history', () => {
   test('a link to a moment is shown as it is; now is no step, for there is none before', async () => {
     stop();
     history.replaceState(null, '', '/#at=500');
-    stop = startAddress();
+    stop = started((on) => startAddress(false, false, on));
     const { length } = history;
     act({ moment: null });
     await vi.waitFor(() => {

@@ -5,6 +5,7 @@ import { VERDICTS } from '../domain/health';
 import { type Period, PERIOD_KINDS } from '../domain/time';
 import type { Camera } from '../geometry/coordinates';
 import { act, store } from './app';
+import { PAGE } from './create';
 import {
   type Charted,
   chartOf,
@@ -152,11 +153,12 @@ const entryNow = (): Entry | null => history.state as Entry | null;
  * always shows what its address says, at present and without a chosen tag; the address is never
  * rewritten. `isRound`: the sensor alone changes by itself.
  */
-export function startAddress(kiosk = false, isRound = false): () => void {
-  return kiosk ? keepToLink(isRound) : keepLink();
+export function startAddress(kiosk = false, isRound = false, signal = PAGE): void {
+  if (kiosk) keepToLink(isRound, signal);
+  else keepLink(signal);
 }
 
-function keepToLink(isRound: boolean): () => void {
+function keepToLink(isRound: boolean, signal: AbortSignal): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
   const follow = (): void => {
@@ -178,16 +180,12 @@ function keepToLink(isRound: boolean): () => void {
     timer = setTimeout(comeBack, RETURN_MS);
   };
   follow();
-  window.addEventListener('hashchange', follow);
-  const stop = store.subscribe(onStore);
-  return () => {
-    window.removeEventListener('hashchange', follow);
-    clearTimeout(timer);
-    stop();
-  };
+  window.addEventListener('hashchange', follow, { signal });
+  store.subscribe(onStore, signal);
+  signal.addEventListener('abort', () => clearTimeout(timer));
 }
 
-function keepLink(): () => void {
+function keepLink(signal: AbortSignal): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
   let entry: Entry = entryNow() ?? { link: 0, tag: null, moment: null, opened: null };
@@ -279,13 +277,8 @@ function keepLink(): () => void {
   };
 
   follow();
-  window.addEventListener('hashchange', onHashChange);
-  window.addEventListener('popstate', onPopState);
-  const stop = store.subscribe(onStore);
-  return () => {
-    window.removeEventListener('hashchange', onHashChange);
-    window.removeEventListener('popstate', onPopState);
-    clearTimeout(timer);
-    stop();
-  };
+  window.addEventListener('hashchange', onHashChange, { signal });
+  window.addEventListener('popstate', onPopState, { signal });
+  store.subscribe(onStore, signal);
+  signal.addEventListener('abort', () => clearTimeout(timer));
 }

@@ -3,7 +3,7 @@ import { useState } from 'react';
 import { retainEqual } from '../domain/memo';
 import { equal } from '../domain/twin';
 import type { Size, View } from '../geometry/coordinates';
-import { type Change, changed, createStore, useSelected } from './create';
+import { type Change, changed, createStore, PAGE, useSelected } from './create';
 import { createFetcher, type FetcherOptions, type FetchTask } from './fetcher';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
 import { NO_TWIN, type TwinState } from './twin';
@@ -46,17 +46,18 @@ export const prefer = (part: Partial<Settings>): void => {
   put({ settings: { ...store.get().settings, ...part } });
 };
 
-/** Calls back when one of these parts of the state changes; returns a stop function. */
+/** Calls back when one of these parts of the state changes. */
 export function onChange(
   parts: (state: AppState) => readonly unknown[],
   listener: () => void,
-): () => void {
+  signal = PAGE,
+): void {
   let seen = parts(store.get());
-  return store.subscribe(() => {
+  store.subscribe(() => {
     const before = seen;
     seen = parts(store.get());
     if (seen.some((part, index) => part !== before[index])) listener();
-  });
+  }, signal);
 }
 
 interface KeepOptions<T> extends FetcherOptions<T> {
@@ -66,24 +67,24 @@ interface KeepOptions<T> extends FetcherOptions<T> {
   readonly everyMs?: number;
 }
 
-/** Fetches what the state needs; undefined: as before. Returns a stop function. */
+/** Fetches what the state needs; undefined: as before. */
 export function keepFetched<T>(
   { everyMs, parts = (state) => [state], ...options }: KeepOptions<T>,
   taskFor: (state: AppState) => FetchTask<T> | null | undefined,
-): () => void {
+  signal = PAGE,
+): void {
   const fetcher = createFetcher(options);
   const update = (): void => {
     const task = taskFor(store.get());
     if (task !== undefined) fetcher.want(task);
   };
   update();
-  const stop = onChange(parts, update);
+  onChange(parts, update, signal);
   const timer = everyMs === undefined ? undefined : setInterval(update, everyMs);
-  return () => {
-    stop();
+  signal.addEventListener('abort', () => {
     clearInterval(timer);
     fetcher.want(null);
-  };
+  });
 }
 
 export function useApp<Part>(select: (state: AppState) => Part): Part {

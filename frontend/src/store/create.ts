@@ -4,10 +4,14 @@ import type { RobotFrame, Session } from '../contract/types';
 import { withParts } from '../domain/memo';
 import type { Box } from '../geometry/coordinates';
 
+/** Never aborts: for what lasts as long as the page. */
+export const PAGE = new AbortController().signal;
+
 export interface Store<State> {
   readonly get: () => State;
   readonly set: (next: State) => void;
-  readonly subscribe: (listener: () => void) => () => void;
+  /** Until the signal aborts, or the returned function is called. */
+  readonly subscribe: (listener: () => void, signal?: AbortSignal) => () => void;
 }
 
 export function createStore<State>(initial: State): Store<State> {
@@ -29,9 +33,11 @@ export function createStore<State>(initial: State): Store<State> {
         }
       }
     },
-    subscribe: (listener) => {
+    subscribe: (listener, signal) => {
+      const stop = (): void => void listeners.delete(listener);
       listeners.add(listener);
-      return () => listeners.delete(listener);
+      signal?.addEventListener('abort', stop);
+      return stop;
     },
   };
 }

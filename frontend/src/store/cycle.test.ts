@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { showTags } from '../testing/page';
 import { CATALOGUE } from '../testing/sensors';
 import { readings, tag, wireTag } from '../testing/tags';
@@ -29,7 +30,7 @@ const pass = (seconds: number): void => {
 };
 
 test('shows each sensor that exists for as long as was wished', () => {
-  stop = startCycle(30);
+  stop = started((on) => startCycle(30, on));
   pass(29.9);
   expect(inView()).toBe('temperature');
   act({ moment: 500 });
@@ -44,12 +45,12 @@ test('shows each sensor that exists for as long as was wished', () => {
 });
 
 test('one sensor stays, and without a wish nothing changes', () => {
-  stop = startCycle(null);
+  stop = started((on) => startCycle(null, on));
   pass(10_000);
   expect(inView()).toBe('temperature');
   stop();
   showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-  stop = startCycle(5);
+  stop = started((on) => startCycle(5, on));
   pass(10);
   expect(inView()).toBe('temperature');
 });

@@ -2,6 +2,7 @@
 import { isMeasured, type Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
 import { act, store } from './app';
+import { PAGE } from './create';
 import { selectSensors } from './derived';
 import { selectTags } from './moment';
 
@@ -30,8 +31,8 @@ export function addressOfPage(search: string, hash: string): string {
   return `?${rest}${hash}`;
 }
 
-export function startCycle(seconds: number | null): () => void {
-  if (seconds === null) return () => undefined;
+export function startCycle(seconds: number | null, signal = PAGE): void {
+  if (seconds === null) return;
   const timer = setInterval(() => {
     const state = store.get();
     // Nothing changes below somebody who looks back.
@@ -40,5 +41,5 @@ export function startCycle(seconds: number | null): () => void {
     const next = sensorAfter(sensors, state.view.sensor);
     if (next) act({ sensor: next.name });
   }, seconds * 1000);
-  return () => clearInterval(timer);
+  signal.addEventListener('abort', () => clearInterval(timer));
 }

@@ -2,9 +2,10 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { snapshotOf } from '../domain/twin';
 import { timelineOf } from '../domain/timeline';
+import { started } from '../testing/life';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { npy, npyEstimate, npyField } from '../testing/field';
-import { wireStretch, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { act, receive, store } from './app';
 import { selectHeat, selectMapped } from './derived';
@@ -40,7 +41,7 @@ beforeEach(() => {
   });
   showTags([wireTag({ readings: readings({ temperature: 22 }) })]);
   goLive(status({ day_length_s: 60 }));
-  stop = startDifference();
+  stop = started(startDifference);
 });
 afterEach(() => {
   stop();
@@ -111,7 +112,7 @@ test('while the twin is silent, the shown state keeps its own time', async () =>
 test.each(['day', 'week'] as const)(
   'before all recorded data nothing is fetched of a %s ago',
   async (compare) => {
-    const reach = wireStretch(1_000, 2_000);
+    const reach = { from: 1_000, to: 2_000 };
     receive({ remembered: ready(timelineOf(wireTimeline({ from: 0, to: 2_000, reach }), 2_000)) });
     act({ compare });
     await settled();

@@ -7,6 +7,7 @@ import { COMPARED, differenceOf, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
 import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
+import { PAGE } from './create';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
 import {
@@ -24,9 +25,9 @@ import { type Difference } from './twin';
 const STEP_S = 10;
 const TICK_MS = 2_000;
 
-export function startDifference(): () => void {
+export function startDifference(signal = PAGE): void {
   let before: AppState | null = null;
-  return keepFetched<Difference>(
+  keepFetched<Difference>(
     {
       paceMs: DRAG_PACE_MS,
       everyMs: TICK_MS,
@@ -47,6 +48,7 @@ export function startDifference(): () => void {
       if (isOther && state.twin.difference !== NOTHING) receive({ difference: NOTHING });
       return compare && taskFor(state, compare);
     },
+    signal,
   );
 }
 

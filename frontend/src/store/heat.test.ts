@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { npyEstimate, npyField } from '../testing/field';
 import { goLost, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -45,7 +46,7 @@ beforeEach(() => {
   });
   showTags([]);
   goLost();
-  stop = startLoaders();
+  stop = started(startLoaders);
 });
 afterEach(() => {
   stop();

@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { judgement } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { connection, goLive, showTags, status } from '../testing/page';
@@ -42,7 +43,7 @@ afterEach(() => {
 const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
 
 test('an hour before now is asked for once, and again after some minutes', async () => {
-  stop = startHourAgo();
+  stop = started(startHourAgo);
   await pass(10);
   expect(hourAgo.get()?.tags.get('1')?.tag.readings.get('temperature')).toBe(20);
   for (const second of [1, 2, 100, 299]) {
@@ -59,7 +60,7 @@ test('an hour before now is asked for once, and again after some minutes', async
 test('where a day is a short one, so is its hour', async () => {
   goLive(status({ day_length_s: 1_440 }));
   receiveState(NOW_S);
-  stop = startHourAgo();
+  stop = started(startHourAgo);
   await pass(10);
   expect(Math.round(Number(requests[0]))).toBe(NOW_S - 60);
   goLive();
@@ -69,7 +70,7 @@ test('nothing is asked until the bridge has said how long an hour is', async () 
   connection(performance.now(), { type: 'start', now: performance.now() });
   act({ moment: 50_000 });
   receive(withPast({ at: 50_000, house: NO_HOUSE }));
-  stop = startHourAgo();
+  stop = started(startHourAgo);
   await pass(1_000);
   expect(requests).toEqual([]);
   goLive(status({ day_length_s: 1_440 }));
@@ -79,7 +80,7 @@ test('nothing is asked until the bridge has said how long an hour is', async () 
 });
 
 test('of the moments that somebody drags through, few are fetched, and the last', async () => {
-  stop = startHourAgo();
+  stop = started(startHourAgo);
   await pass(10);
   for (const moment of [50_000, 50_100, 50_200]) {
     act({ moment });
@@ -92,7 +93,7 @@ test('of the moments that somebody drags through, few are fetched, and the last'
 
 test('nobody asks for a trend that nobody wants to see, nor for what was before all time', async () => {
   prefer({ hidden: ['trend'] });
-  stop = startHourAgo();
+  stop = started(startHourAgo);
   await pass(1_000);
   receiveState(3_599);
   prefer({ hidden: [] });
@@ -102,7 +103,7 @@ test('nobody asks for a trend that nobody wants to see, nor for what was before 
 
 test('a twin that keeps no past is asked again after a while, not with each frame', async () => {
   answers = false;
-  stop = startHourAgo();
+  stop = started(startHourAgo);
   await pass(10);
   answers = true;
   receiveState(NOW_S + 1);

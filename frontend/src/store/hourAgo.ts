@@ -2,10 +2,10 @@
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import { hourText, type TagThen } from '../domain/difference';
-import { secondsOf } from '../domain/time';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { keepFetched, store, type AppState } from './app';
-import { createStore } from './create';
+import { createStore, PAGE } from './create';
+import type { FetchTask } from './fetcher';
 import { rosNow, selectDayS, selectLatest, selectShown } from './moment';
 import { isColumnShown } from './settings';
 import { NOT_JUDGED } from '../domain/health';
@@ -41,7 +41,7 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
   const { snapshot } = selectLatest(state);
   if (!last || !snapshot) return null;
   // Valid for twice the TTL: the next answer is on its way.
-  const isNear = Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state);
+  const isNear = Math.abs(snapshot.at - last.of) <= 2 * SERVES * selectHourS(state);
   return isNear ? last : null;
 }
 
@@ -49,9 +49,8 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
 export const thenOf = (last: HourAgo | null, tag: Tag): TagThen | null =>
   last?.tags.get(tag.id) ?? null;
 
-export function startHourAgo(): () => void {
-  // On failure, the table and the alarms show no trend.
-  const stop = keepFetched<HourAgo>({ paceMs: PACE_MS, onValue: hourAgo.set }, (state) => {
+export function startHourAgo(signal = PAGE): void {
+  const taskFor = (state: AppState): FetchTask<HourAgo> | null => {
     const { moment } = selectShown(state);
     const hourS = selectHourS(state);
     const base = moment ?? rosNow(state, now());
@@ -61,8 +60,8 @@ export function startHourAgo(): () => void {
     if (base === null || base < hourS || !isSeen || !hasStatus) return null;
     return {
       key: moment === null ? `now ${Math.floor(base / (SERVES * hourS))}` : `at ${moment}`,
-      run: (signal) =>
-        fetchStateAt(base - hourS, signal).then((latest) => {
+      run: (on) =>
+        fetchStateAt(base - hourS, on).then((latest) => {
           const { tags } = snapshotOf(latest, 0, null);
           const known = tags.map((tag): [string, TagThen] => [
             tag.id,
@@ -71,9 +70,8 @@ export function startHourAgo(): () => void {
           return { of: base, tags: new Map(known) };
         }),
     };
-  });
-  return () => {
-    stop();
-    hourAgo.set(null);
   };
+  // On failure, the table and the alarms show no trend.
+  keepFetched<HourAgo>({ paceMs: PACE_MS, onValue: hourAgo.set }, taskFor, signal);
+  signal.addEventListener('abort', () => hourAgo.set(null));
 }

@@ -3,6 +3,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { now } from '../clock';
 import type { Frame } from '../contract/types';
 import { ageSeconds } from '../domain/time';
+import { started } from '../testing/life';
 import { alarm, alarms } from '../testing/alarms';
 import { status } from '../testing/page';
 import { NOBODY } from '../testing/health';
@@ -38,7 +39,7 @@ const revision = (): string | undefined => store.get().twin.latest.snapshot?.rev
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance'] });
   vi.stubGlobal('WebSocket', FakeSocket);
-  stop = startLive();
+  stop = started(startLive);
   FakeSocket.last.onopen?.();
 });
 afterEach(() => {
@@ -73,7 +74,7 @@ test('of many frames the newest is taken, a few times a second', () => {
 });
 
 test('deltas are put together; one that does not fit makes a new connection', () => {
-  const header = { stamp: { sec: 50, nanosec: 0 }, frame_id: 'map' };
+  const header = { stamp: 50, frame_id: 'map' };
   const delta = {
     type: 'delta',
     revision: 'd',
@@ -158,7 +159,7 @@ describe('a machine that slept for an hour', () => {
     stop();
     sec += 10_000;
     vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
-    stop = startLive();
+    stop = started(startLive);
     FakeSocket.last.onopen?.();
     FakeSocket.last.speak(status());
     FakeSocket.last.speak(stateFrame([scannedAt(sec - 5)], { sec }));

@@ -1,12 +1,17 @@
 /** The page's one connection, and how its frames change the store. */
-import { now, onLapse } from '../clock';
+import { lapses, now } from '../clock';
 import { latestAfter, parseFrame, statusOf } from '../contract/frames';
-import { connect, type Link, signInIfRequired } from '../connection/socket';
+import {
+  connect,
+  type ConnectionHandlers,
+  type Link,
+  signInIfRequired,
+} from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
-import type { Latest } from '../contract/types';
+import type { Frame, Latest } from '../contract/types';
 import { receive } from './app';
 import { withConnection, withState, withUnread } from './twin';
-import { robotFrame } from './create';
+import { PAGE, robotFrame } from './create';
 
 /**
  * Frames arrive up to ten times a second; the page takes the latest at most four times a second.
@@ -27,7 +32,7 @@ export function retryConnection(): void {
   current?.dispatch('wake');
 }
 
-export function startLive(): () => void {
+export function startLive(signal = PAGE): void {
   let latest: Latest | null = null;
   let arrivedAt = 0;
   let isNew = false;
@@ -61,7 +66,7 @@ export function startLive(): () => void {
     forget = setTimeout(() => receive({ unread: null }), REPORT_MS);
   };
 
-  const link = connect(stateSocketUrl(), {
+  const handlers: ConnectionHandlers<Frame> = {
     parse: parseFrame,
     statusOf,
     onConnection: (connection) => receive(withConnection(connection, now())),
@@ -102,19 +107,19 @@ export function startLive(): () => void {
       if (pause <= 0) take(null);
       else timer ??= setTimeout(take, pause, null);
     },
-  });
+  };
+  const link = connect(stateSocketUrl(), handlers, signal);
   current = link;
-  const unsubscribe = onLapse(() => {
+  const onLapse = (): void => {
     latest = null;
     isNew = false;
     receive({ isTimeLost: true });
     link.dispatch('start');
-  });
-  return () => {
-    unsubscribe();
+  };
+  lapses.addEventListener('lapse', onLapse, { signal });
+  signal.addEventListener('abort', () => {
     clearTimeout(timer);
     clearTimeout(forget);
-    link.stop();
     current = null;
-  };
+  });
 }

@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { npyField } from '../testing/field';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
@@ -22,7 +23,7 @@ beforeEach(() => {
   });
   showTags([]);
   goLost();
-  stop = startLoaders();
+  stop = started(startLoaders);
 });
 afterEach(() => {
   stop();

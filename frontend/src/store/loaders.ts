@@ -4,6 +4,7 @@ import { answer, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, keepFetched, onChange, receive, store } from './app';
+import { PAGE } from './create';
 import { withField, withLatest, withQuality } from './twin';
 import { sourceOf } from './derived';
 import { failed, NOTHING, ready, type FetchTask } from './fetcher';
@@ -20,40 +21,37 @@ const QUALITY_INTERVAL_MS = 3_000;
 /** The error of a past field is fetched once the moment has stayed this long. */
 const QUALITY_AFTER_MS = 400;
 
-export function startLoaders(): () => void {
+export function startLoaders(signal = PAGE): void {
   forgetOld();
-  const stops = [
-    onChange((state) => [state.twin], forgetOld),
-    keepFetched<Field>(
-      {
-        paceMs: FIELD_INTERVAL_MS,
-        everyMs: ESTIMATE_TICK_MS,
-        onValue: (value) => receive(withField(ready(value))),
-        onError: (message) => {
-          receive(withField(failed(message, selectLatest(store.get()).field.value)));
-        },
+  onChange((state) => [state.twin], forgetOld, signal);
+  keepFetched<Field>(
+    {
+      paceMs: FIELD_INTERVAL_MS,
+      everyMs: ESTIMATE_TICK_MS,
+      onValue: (value) => receive(withField(ready(value))),
+      onError: (message) => {
+        receive(withField(failed(message, selectLatest(store.get()).field.value)));
       },
-      fieldTask,
-    ),
-    keepFetched<MapPicture>(
-      {
-        paceMs: MAP_INTERVAL_MS,
-        onValue: (value) => receive(withLatest({ map: ready(value) })),
-        onError: (message) => {
-          receive(withLatest({ map: failed(message, selectLatest(store.get()).map.value) }));
-        },
+    },
+    fieldTask,
+    signal,
+  );
+  keepFetched<MapPicture>(
+    {
+      paceMs: MAP_INTERVAL_MS,
+      onValue: (value) => receive(withLatest({ map: ready(value) })),
+      onError: (message) => {
+        receive(withLatest({ map: failed(message, selectLatest(store.get()).map.value) }));
       },
-      (state) => {
-        const base = baseKey(state);
-        const hasMap = state.twin.connection.status?.has_map;
-        return base !== null && hasMap ? { key: base, group: 'map', run: loadMap } : null;
-      },
-    ),
-    startQuality(),
-  ];
-  return () => {
-    for (const stop of stops) stop();
-  };
+    },
+    (state) => {
+      const base = baseKey(state);
+      const hasMap = state.twin.connection.status?.has_map;
+      return base !== null && hasMap ? { key: base, group: 'map', run: loadMap } : null;
+    },
+    signal,
+  );
+  startQuality(signal);
 }
 
 function fieldTask(state: AppState): FetchTask<Field> | null {
@@ -73,7 +71,7 @@ function fieldTask(state: AppState): FetchTask<Field> | null {
   };
 }
 
-export const startQuality = (): (() => void) =>
+export const startQuality = (signal = PAGE): void =>
   keepFetched<FieldQuality>(
     {
       paceMs: QUALITY_INTERVAL_MS,
@@ -81,6 +79,7 @@ export const startQuality = (): (() => void) =>
       onError: () => receive(withQuality(null)),
     },
     qualityTask,
+    signal,
   );
 
 /** The error of the shown field of nearest readings; an estimate has its own. */
@@ -128,9 +127,9 @@ function baseKey(state: AppState): string | null {
 const SENSORS_INTERVAL_MS = 500;
 
 /** Fetches the file of sensors at the start and on each new connection, as the server may be another. */
-export function startSensors(): () => void {
+export function startSensors(signal = PAGE): void {
   let known = '';
-  return keepFetched<SensorsFile>(
+  keepFetched<SensorsFile>(
     {
       paceMs: SENSORS_INTERVAL_MS,
       onValue: (file) => {
@@ -154,8 +153,9 @@ export function startSensors(): () => void {
       // The first connection opens during this fetch, and to the same bridge.
       key: String(Math.max(1, connection.epoch)),
       group: 'sensors',
-      run: (signal) => answer(signal, 'api/sensors', ['ramp', 'fallback', 'sensors']),
+      run: (on) => answer(on, 'api/sensors', ['ramp', 'fallback', 'sensors']),
     }),
+    signal,
   );
 }
 

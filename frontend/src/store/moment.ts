@@ -4,7 +4,7 @@
  */
 import { now } from '../clock';
 import type { StatusFrame } from '../contract/types';
-import { secondsOf, type Span, spanOf } from '../domain/time';
+import { type Span, spanOf } from '../domain/time';
 import { DAY_S } from '../domain/difference';
 import { memoLast, memoOne } from '../domain/memo';
 import type { Snapshot, Tag } from '../domain/twin';
@@ -89,7 +89,7 @@ export function selectAwaited(state: AppState): number | null {
 export function rosNow({ twin }: AppState, at: number): number | null {
   const { snapshot } = twin.latest;
   if (!snapshot) return null;
-  const taken = secondsOf(snapshot.at);
+  const taken = snapshot.at;
   if (taken === 0) return null;
   const goesOn = clockOf(twin) === 'running';
   return goesOn ? taken + Math.max(0, at - snapshot.takenAt) / 1000 : taken;
@@ -102,7 +102,7 @@ export const latestTime = (state: AppState, at: number): number | null =>
 /** As of when ages are shown, ROS seconds: of now, or of the state at a past moment; null: unknown. */
 export function shownTime(state: AppState, at: number): number | null {
   const { moment, snapshot } = selectShown(state);
-  return moment === null ? latestTime(state, at) : snapshot && secondsOf(snapshot.at);
+  return moment === null ? latestTime(state, at) : (snapshot?.at ?? null);
 }
 
 /**

@@ -1,7 +1,8 @@
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { timelineOf } from '../domain/timeline';
-import { wireStretch, wireTimeline } from '../testing/timeline';
+import { started } from '../testing/life';
+import { wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
 import { fromFragment, toFragment } from './address';
@@ -14,7 +15,7 @@ const SHORT_S = 10_800;
 let stop: () => void;
 
 const remember = (seconds: number | null): void => {
-  const reach = seconds === null ? null : wireStretch(NOW - seconds, NOW);
+  const reach = seconds === null ? null : { from: NOW - seconds, to: NOW };
   const value = timelineOf(wireTimeline({ from: NOW - 86_400, to: NOW, reach }), NOW);
   receive({ remembered: { value, state: 'ready', message: '' } });
 };
@@ -27,7 +28,7 @@ const address = (): string => toFragment(store.get().view);
 beforeEach(() => {
   receive({ remembered: NOTHING });
   act(DEFAULT_VIEW);
-  stop = startOpening();
+  stop = started(startOpening);
 });
 afterEach(() => {
   stop();

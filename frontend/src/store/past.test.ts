@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { npyEstimate, npyField } from '../testing/field';
 import { goLive, goLost, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
@@ -62,7 +63,7 @@ beforeEach(() => {
   );
   receive(withPast(null));
   showTags([wireTag({ readings: readings({ temperature: 1_000 }) })]);
-  stop = startPast();
+  stop = started(startPast);
 });
 afterEach(async () => {
   act({ moment: null });
@@ -135,7 +136,7 @@ test('a link that is opened shows nothing before its moment has come', async () 
     ...(await import('./past')),
   };
   fresh.act({ moment: 50 });
-  const end = fresh.startPast();
+  const end = started(fresh.startPast);
   const { moment, snapshot } = fresh.selectShown(fresh.store.get());
   expect([moment, snapshot]).toEqual([50, null]);
   await answerAll(50);
@@ -221,7 +222,7 @@ test('each connection asks anew, a lost one does not', async () => {
 
 test('how far off the field is, is asked for once the moment stays', async () => {
   go(50);
-  const stopQuality = startQuality();
+  const stopQuality = started(startQuality);
   await answerAll(50);
   await pass(300);
   go(40);
@@ -259,7 +260,7 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
   await answerAll(at);
   expect(shown()).toEqual([at, at, at]);
   expect(selectShown(store.get()).field.value?.sureness?.sdKnown).toBe(1);
-  const stopQuality = startQuality();
+  const stopQuality = started(startQuality);
   await pass(2_000);
   // The error of the nearest readings is not needed.
   expect(requests.some(({ path }) => path.endsWith('field/quality'))).toBe(false);

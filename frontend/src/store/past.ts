@@ -4,6 +4,7 @@ import { fetchStateAt } from '../contract/past';
 import type { Field } from '../contract/types';
 import { snapshotOf } from '../domain/twin';
 import { type AppState, keepFetched, receive, store } from './app';
+import { PAGE } from './create';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectLatest, selectPast } from './moment';
@@ -16,7 +17,7 @@ import { NO_HOUSE, type Past, withPast } from './twin';
  */
 const PATIENCE_MS = 300;
 
-export function startPast(): () => void {
+export function startPast(signal = PAGE): void {
   let patience: ReturnType<typeof setTimeout> | undefined;
   let receivedOn = 0;
 
@@ -56,14 +57,9 @@ export function startPast(): () => void {
     return taskFor(state, moment, receivedOn);
   };
   const parts = ({ view, twin }: AppState): readonly unknown[] => [view, twin];
-  const stop = keepFetched<Past>(
-    { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError },
-    task,
-  );
-  return () => {
-    stop();
-    clearTimeout(patience);
-  };
+  const options = { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError };
+  keepFetched<Past>(options, task, signal);
+  signal.addEventListener('abort', () => clearTimeout(patience));
 }
 
 function taskFor(state: AppState, at: number, epoch: number): FetchTask<Past> {

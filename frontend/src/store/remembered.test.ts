@@ -1,8 +1,9 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { goLive, goLost, showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { wireStretch, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { fromFragment } from './address';
 import { requestedSpan, startOpening, startRemembered, turnOf } from './remembered';
@@ -23,7 +24,7 @@ beforeEach(() => {
   });
   receive({ remembered: NOTHING });
   showTags([wireTag()]);
-  stop = startRemembered();
+  stop = started(startRemembered);
 });
 afterEach(() => {
   stop();
@@ -76,10 +77,10 @@ test('another period is fetched at once, and nothing of the last is left', async
 });
 
 test('a link that names no period brings back what the page opens on, at once', async () => {
-  const stopOpening = startOpening();
+  const stopOpening = started(startOpening);
   const latest = stateFrame([wireTag()], { sec: 1_000_000, revision: 'r' });
   receive(withState(latest, performance.now()));
-  answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: wireStretch(0, 240) }));
+  answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: { from: 0, to: 240 } }));
   await pass(1_100);
   expect(store.get().view.period).toEqual({ kind: 'hour' });
   // Also twice, before any refetch.

@@ -4,6 +4,7 @@ import { fetchTimeline } from '../contract/past';
 import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { type Timeline, timelineOf } from '../domain/timeline';
 import { act, keepFetched, receive, store } from './app';
+import { PAGE } from './create';
 import { failed, NOTHING, ready } from './fetcher';
 import { rosNow, selectLatest } from './moment';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
@@ -34,10 +35,10 @@ export function turnOf(period: Period, nowS: number): number {
   return Math.floor(nowS / Math.min(LATEST_S, Math.max(SOONEST_S, bucketS)));
 }
 
-export function startRemembered(): () => void {
+export function startRemembered(signal = PAGE): void {
   let requested = '';
   let changes = 0;
-  return keepFetched<Timeline>(
+  keepFetched<Timeline>(
     {
       paceMs: INTERVAL_MS,
       everyMs: INTERVAL_MS,
@@ -70,12 +71,13 @@ export function startRemembered(): () => void {
       return {
         key: `${epoch}|${turnOf(period, nowS)}`,
         group: String(changes),
-        run: (signal) =>
-          fetchTimeline(requestedSpan(period, nowS), BUCKETS, signal).then((wire) =>
+        run: (on) =>
+          fetchTimeline(requestedSpan(period, nowS), BUCKETS, on).then((wire) =>
             timelineOf(wire, nowS),
           ),
       };
     },
+    signal,
   );
 }
 
@@ -92,7 +94,7 @@ function isShort(reach: Span, moment: number | null): boolean {
  * Chooses the period that the page opens on, if neither link nor user has chosen one: once, when the
  * length of the history is known. Later no period changes by itself.
  */
-export function startOpening(): () => void {
+export function startOpening(signal = PAGE): void {
   let opensShort: boolean | null = null;
   const update = (): void => {
     const { twin, view } = store.get();
@@ -103,5 +105,5 @@ export function startOpening(): () => void {
     }
   };
   update();
-  return store.subscribe(update);
+  store.subscribe(update, signal);
 }

@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { started } from '../testing/life';
 import { CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
 import { goLive, goLost, showTags } from '../testing/page';
 import { judgement } from '../testing/health';
@@ -37,13 +38,13 @@ test('before the answer has come no sensor has a range, and no heat map a colour
   expect(selectSensors(store.get()).map(({ name }) => name)).toEqual(['temperature']);
   expect(selectSensor(store.get()).ideal).toBeNull();
   expect(selectHeat(store.get())).toBeNull();
-  stop = startSensors();
+  stop = started(startSensors);
   await come();
   expect(selectSensor(store.get())).toMatchObject({ label: 'Temperature', ideal: [18, 26] });
 });
 
 test('is asked for again on each new connection, and only another answer changes anything', async () => {
-  stop = startSensors();
+  stop = started(startSensors);
   await come();
   goLive();
   await come();
@@ -64,7 +65,7 @@ test('a failure is told, is tried again, and takes away nothing that is known', 
   answer.mockImplementation(() =>
     Promise.resolve(new Response('{"detail":"busy"}', { status: 503 })),
   );
-  stop = startSensors();
+  stop = started(startSensors);
   await come();
   expect(store.get().twin.sensors).toEqual({ value: null, state: 'failed', message: 'busy' });
   answer.mockImplementation(() => fileWith(FILE.sensors));
@@ -74,13 +75,13 @@ test('a failure is told, is tried again, and takes away nothing that is known', 
 
 test('a file without the sensor that the page opens with shows its first, unless one is chosen', async () => {
   answer.mockImplementation(() => fileWith({ ph: FILE.fallback, ec: FILE.fallback }));
-  stop = startSensors();
+  stop = started(startSensors);
   await come();
   expect(store.get().view.sensor).toBe('ph');
   stop();
   act({ sensor: 'humidity' });
   receive({ sensors: NOTHING });
-  stop = startSensors();
+  stop = started(startSensors);
   await come();
   expect(store.get().view.sensor).toBe('humidity');
 });

@@ -3,6 +3,7 @@ import { afterEach, beforeEach, expect, test, vi, type Mock } from 'vitest';
 import { prefer } from './app';
 import { DEFAULT_SETTINGS } from './settings';
 import { isDark, isPrinting, onThemeChange, startTheme } from './theme';
+import { started } from '../testing/life';
 
 let listener: Mock<() => void>;
 let stops: (() => void)[];
@@ -10,7 +11,7 @@ let stops: (() => void)[];
 beforeEach(() => {
   prefer(DEFAULT_SETTINGS);
   listener = vi.fn<() => void>();
-  stops = [onThemeChange(listener), startTheme()];
+  stops = [started((on) => onThemeChange(listener, on)), started(startTheme)];
 });
 afterEach(() => {
   for (const stop of stops) stop();

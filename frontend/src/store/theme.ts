@@ -2,7 +2,7 @@ import { flushSync } from 'react-dom';
 
 import { timeOfDay } from '../clock';
 import { onChange, store } from './app';
-import { createStore } from './create';
+import { createStore, PAGE } from './create';
 
 const system = window.matchMedia('(prefers-color-scheme: dark)');
 const forced = window.matchMedia('(forced-colors: active)');
@@ -24,24 +24,18 @@ export function isDark(): boolean {
 }
 
 /** Calls back whenever the colours may have changed; paper is always light. */
-export function onThemeChange(listener: () => void): () => void {
-  const stops = [
-    onChange(({ settings }) => [settings.theme], listener),
-    printing.subscribe(listener),
-  ];
-  for (const query of [system, forced]) query.addEventListener('change', listener);
-  return () => {
-    for (const stop of stops) stop();
-    for (const query of [system, forced]) query.removeEventListener('change', listener);
-  };
+export function onThemeChange(listener: () => void, signal: AbortSignal): void {
+  onChange(({ settings }) => [settings.theme], listener, signal);
+  printing.subscribe(listener, signal);
+  for (const query of [system, forced]) query.addEventListener('change', listener, { signal });
 }
 
-export function startTheme(): () => void {
+export function startTheme(signal = PAGE): void {
   const apply = (): void => {
     const root = document.documentElement;
     root.dataset['theme'] = isDark() ? 'dark' : 'light';
     root.toggleAttribute('data-printing', isPrinting());
   };
   apply();
-  return onThemeChange(apply);
+  onThemeChange(apply, signal);
 }

@@ -13,8 +13,8 @@ type Given = Partial<Omit<Alarm, 'reason' | 'raised_at' | 'cleared_at'>> & {
 export const alarm = (id: string, { raised = 90, cleared = null, ...over }: Given = {}): Alarm => ({
   id,
   tag_id: '1',
-  raised_at: { sec: raised, nanosec: 0 },
-  cleared_at: cleared === null ? null : { sec: cleared, nanosec: 0 },
+  raised_at: raised,
+  cleared_at: cleared,
   worst: null,
   ...over,
   reason: reason(over.reason),
@@ -23,7 +23,7 @@ export const alarm = (id: string, { raised = 90, cleared = null, ...over }: Give
 export const alarms = (list: readonly Alarm[], over: Partial<Alarms> = {}): Alarms => ({
   alarms: list,
   source: 'journal',
-  since: { sec: 1, nanosec: 0 },
+  since: 1,
   ...over,
 });
 

@@ -11,7 +11,7 @@ export const reason = (over: Partial<HealthReason> = {}): HealthReason => ({
   sensor: 'temperature',
   value: 6.6,
   limit: 10,
-  since: { sec: 100, nanosec: 0 },
+  since: 100,
   ...over,
 });
 

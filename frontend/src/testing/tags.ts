@@ -7,7 +7,7 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
     tag_id: '1',
     pose: { position: { x: 1, y: 2, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
     readings: [],
-    last_observed: { sec: 100, nanosec: 0 },
+    last_observed: 100,
     stale_seconds: 5,
     species: '',
     species_confidence: null,
@@ -33,7 +33,7 @@ export const readings = (
   Object.entries(values).map(([name, value]) => ({
     name,
     value,
-    observed_at: { sec, nanosec: 0 },
+    observed_at: sec,
   }));
 
 export function stateFrame(
@@ -44,7 +44,7 @@ export function stateFrame(
     type: 'state',
     seq,
     revision,
-    state: { header: { stamp: { sec, nanosec: 0 }, frame_id: 'map' }, tags },
+    state: { header: { stamp: sec, frame_id: 'map' }, tags },
     health,
   };
 }
@@ -52,7 +52,7 @@ export function stateFrame(
 export const snapshot = (tags: readonly Tag[]): Snapshot => ({
   tags,
   revision: 'r1',
-  at: { sec: 1000, nanosec: 0 },
+  at: 1000,
   takenAt: 0,
   isWhole: true,
 });

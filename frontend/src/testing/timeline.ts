@@ -1,5 +1,6 @@
-import type { WireTime, Timeline as WireTimeline } from '../contract/types';
+import type { Timeline as WireTimeline } from '../contract/types';
 import { type Point, readingAt, type Series } from '../domain/series';
+import type { Span } from '../domain/time';
 import type { Timeline } from '../domain/timeline';
 
 /** A hundred seconds without events, except the given ones. */
@@ -15,36 +16,15 @@ export const timelineWith = (over: Partial<Timeline>): Timeline => ({
   ...over,
 });
 
-export const wireTime = (seconds: number): WireTime => ({
-  sec: Math.floor(seconds),
-  nanosec: Math.round((seconds % 1) * 1e9),
-});
-
-export const wireStretch = (
-  from: number,
-  to: number,
-): { readonly from: WireTime; readonly to: WireTime } => ({
-  from: wireTime(from),
-  to: wireTime(to),
-});
-
-export function wireTimeline({
+export const wireTimeline = ({
   from,
   to,
   ...over
-}: { from: number; to: number } & Partial<Omit<WireTimeline, 'from' | 'to'>>): WireTimeline {
-  return {
-    ...wireStretch(from, to),
-    bucket_s: (to - from) / 240,
-    reach: wireStretch(from, to),
-    buckets: [],
-    silences: [],
-    runs: [],
-    complete_to: wireTime(to),
-    kept_from: wireTime(from),
-    ...over,
-  };
-}
+}: Span & Partial<WireTimeline>): WireTimeline => ({
+  ...{ from, to, bucket_s: (to - from) / 240, reach: { from, to } },
+  ...{ buckets: [], silences: [], runs: [], complete_to: to, kept_from: from },
+  ...over,
+});
 
 interface Given extends Partial<Series> {
   readonly readings?: readonly { readonly at: number; readonly value: number | null }[];

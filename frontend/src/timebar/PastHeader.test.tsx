@@ -4,6 +4,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { startTitle } from '../alarms/watch';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE, withPast, withState } from '../store/twin';
+import { started } from '../testing/life';
 import { goLive, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { PastFrame, PastHeader } from './Past';
@@ -14,7 +15,7 @@ beforeEach(() => {
   vi.spyOn(performance, 'now').mockReturnValue(performance.now());
   showTags([]);
   receive(withState(stateFrame([wireTag()], { sec: 10_000 }), performance.now()));
-  stop = startTitle();
+  stop = started(startTitle);
 });
 afterEach(() => {
   stop();

@@ -7,14 +7,14 @@ import { pointedTime } from '../store/create';
 import { NO_HOUSE, NO_TWIN, withPast, withState } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { wireTime, wireTimeline } from '../testing/timeline';
+import { wireTimeline } from '../testing/timeline';
 import { fieldOf, momentOf, TimeBar } from './TimeBar';
 
 const NOW = 10_000;
 
 const remember = (from: number, to: number): void => {
   const buckets = [
-    { start: wireTime(9_000), scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
+    { start: 9_000, scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
   ];
   const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }), NOW);
   receive({ remembered: { value, state: 'ready', message: '' } });

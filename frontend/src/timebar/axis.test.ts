@@ -116,8 +116,8 @@ describe('columns', () => {
 
   test('a clock that began anew is marked; the first beginning is none', () => {
     const runs = [
-      { from: 100.5, to: 140, isSimulated: true },
-      { from: 150, to: 200, isSimulated: true },
+      { from: 100.5, to: 140, is_simulated: true },
+      { from: 150, to: 200, is_simulated: true },
     ];
     expect(runStarts(timelineWith({ runs }), AXIS)).toEqual([500]);
   });

@@ -19,14 +19,14 @@ export const playback = createStore<{ isPlaying: boolean; speed: Speed }>({
 });
 
 let timer: ReturnType<typeof setInterval> | undefined;
-let unsubscribe: () => void = () => undefined;
+let playing = new AbortController();
 /** The last played moment, ROS seconds, and when it was played, ms. */
 let at = 0;
 let since = 0;
 
 export function pause(): void {
   clearInterval(timer);
-  unsubscribe();
+  playing.abort();
   if (playback.get().isPlaying) playback.set({ ...playback.get(), isPlaying: false });
 }
 
@@ -39,11 +39,12 @@ export function play(): void {
   go(state.view.moment ?? barSpan(state, nowS).from);
   playback.set({ ...playback.get(), isPlaying: true });
   timer = setInterval(tick, TICK_MS);
+  playing = new AbortController();
   // Any other change of the moment stops playback.
-  unsubscribe = store.subscribe(() => {
+  store.subscribe(() => {
     const { moment } = store.get().view;
     if (moment === null || Math.abs(moment - at) > 0.001) pause();
-  });
+  }, playing.signal);
 }
 
 export function togglePlayback(): void {

@@ -3,6 +3,7 @@ import { afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 
 import { politeVoice, urgentVoice } from '../alarms/watch';
 import { announce } from '../store/create';
+import { started } from '../testing/life';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
@@ -19,7 +20,7 @@ let stop: () => void;
 
 beforeEach(() => {
   showTags(house([ILL, WELL, WELL, WELL, WELL, WELL]), judged([ILL, WELL, WELL, WELL, WELL, WELL]));
-  stop = startKeys();
+  stop = started(startKeys);
   render(<Announcer />);
 });
 afterEach(() => {

@@ -1,8 +1,9 @@
 import { act, render, screen, within } from '@testing-library/react';
-import { expect, test } from 'vitest';
+import { expect, onTestFinished, test } from 'vitest';
 
 import { shelveAlarms } from '../alarms/own';
 import { startAlarms } from '../alarms/watch';
+import { started } from '../testing/life';
 import { alarm, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
@@ -67,7 +68,7 @@ test('what ails more than a few tags has one line, as among the alarms, and the 
 });
 
 test('of what ails many as well, since when it is active where it is worst', () => {
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   const cold = (at: number) => reason({ value: 9 - at / 10 });
   act(() => {
     reportAlarms(alarm('a', { tag_id: '13', reason: cold(13) }));
@@ -80,7 +81,6 @@ test('of what ails many as well, since when it is active where it is worst', () 
     expect.stringMatching(/^since/),
     expect.stringMatching(/^Tags 13/),
   ]);
-  stop();
 });
 
 test('ends with how many more tags there are', () => {
@@ -105,7 +105,7 @@ test('says so when nobody does, and when that is not known', () => {
 test('if all is shelved, or the robot stands still, it does not say that nothing needs attention', () => {
   const said = judgement({ bug: [pest] });
   showTags([wireTag({ tag_id: 'bug' })], said);
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<AttentionList />);
   act(() => {
     const pestAlarm = alarm('a', { tag_id: 'bug', reason: pest });
@@ -114,7 +114,6 @@ test('if all is shelved, or the robot stands still, it does not say that nothing
   });
   expect(ids()).toEqual([]);
   expect(screen.queryByRole('heading')).toBeNull();
-  stop();
   document.body.replaceChildren();
   const well = judgement({ well: 'healthy' });
   const stopped = reason({ kind: 'stopped', verdict: 'unknown', sensor: '', value: null });

@@ -153,10 +153,8 @@ function closeKiosk(): void {
 }
 
 /** Handles Esc, the key that `KioskNote` names. */
-export function startKioskClose(): () => void {
-  const onKeyDown = (event: KeyboardEvent): void => {
+export function startKioskClose(): void {
+  document.addEventListener('keydown', (event) => {
     if (event.key === 'Escape' && !event.defaultPrevented) closeKiosk();
-  };
-  document.addEventListener('keydown', onKeyDown);
-  return () => document.removeEventListener('keydown', onKeyDown);
+  });
 }

@@ -1,6 +1,6 @@
 import type { JSX, ReactNode } from 'react';
 
-import { rosText, secondsOf } from '../domain/time';
+import { rosText } from '../domain/time';
 import { useApp, type AppState } from '../store/app';
 import {
   phaseWord,
@@ -87,8 +87,7 @@ function selectSimulatedUntil(state: AppState): number | null {
   const simulated = state.twin.connection.status?.journal.simulated;
   // In a pure simulation, later data is no more real.
   if (moment === null || !simulated || selectOrigin(state) === 'simulated') return null;
-  const end = secondsOf(simulated.end);
-  return moment < end ? end : null;
+  return moment < simulated.end ? simulated.end : null;
 }
 
 /** Says that the shown data was not observed: a demo starts with simulated days. */

@@ -1,11 +1,12 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
-import { expect, test } from 'vitest';
+import { expect, onTestFinished, test } from 'vitest';
 
 import { calling } from '../alarms/list';
 import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarms } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
+import { started } from '../testing/life';
 import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
@@ -34,7 +35,7 @@ test('says what to do first, and since when', () => {
   const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
   const few = { ...pest, value: 0 };
   showTags(TAGS, judgement({ 1: [few], 5: [pest] }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<HealthSummary kiosk={false} />);
   act(() => {
     receive({ alarms: alarms([], { source: 'starting' }) });
@@ -74,7 +75,6 @@ test('says what to do first, and since when', () => {
     expect.stringMatching(/^CriticalTag 5: 2 pests seen.* acknowledged$/),
     expect.stringMatching(/^StressedTag 5: Temperature .* no alarm yet\+ 1 more$/),
   ]);
-  stop();
 });
 
 test('a damp spell at a tag is one task, from its first alarm on; what failed while the past is read counts', () => {
@@ -83,7 +83,7 @@ test('a damp spell at a tag is one task, from its first alarm on; what failed wh
   const margin = reason({ ...vpd, sensor: 'condensation_margin', value: 1.1, limit: 1.5 });
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
   showTags(TAGS, judgement({ 1: [failed], 5: [humid, vpd, margin] }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<HealthSummary kiosk={false} />);
   const tasks = () =>
     [...screen.getByRole('list', { name: 'Do this now' }).children].map((it) => it.textContent);
@@ -105,7 +105,6 @@ test('a damp spell at a tag is one task, from its first alarm on; what failed wh
   expect(tasks()).toEqual([
     expect.stringMatching(`^StressedTag 5: ${air}Ventilate and heat since sim 00:01:40$`),
   ]);
-  stop();
 });
 
 test('nobody is called for what is shelved, and all the rest is counted', () => {
@@ -114,7 +113,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
   const pest = reason({ kind: 'pest', verdict: 'stressed', sensor: '', value: 2, limit: null });
   showTags(tags, judgement({ 1: [reason()], 2: [mild], 3: [mild], 4: [pest], 5: [failed] }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   act(() => {
@@ -143,13 +142,12 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   });
   expect(todo.textContent).toBe('');
   expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();
-  stop();
 });
 
 test('that it is too cold is not shelved with that it was too warm', () => {
   const warm = reason({ verdict: 'critical', value: 40, limit: 35 });
   showTags(TAGS, judgement({ 1: 'healthy', 5: [warm] }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<HealthSummary kiosk={false} />);
   act(() => {
     reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
@@ -162,7 +160,6 @@ test('that it is too cold is not shelved with that it was too warm', () => {
     reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
   });
   expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*no alarm yet$/);
-  stop();
 });
 
 test('of a robot that stands still what is critical is told first', () => {
@@ -182,11 +179,11 @@ test('a value that is too old says its age, and an attempt that of the last one'
   const cold = wireTag({ tag_id: '5', readings: readings({ temperature: 6.6 }, at) });
   const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
-  const attempt = { last_try: { sec: at + 2_340, nanosec: 0 }, last_try_status: 1 };
+  const attempt = { last_try: at + 2_340, last_try_status: 1 };
   const tags = [cold, wireTag({ tag_id: '6', ...attempt })];
   showTags(tags, judgement({ 5: [reason(), reason(old)], 6: [failed] }));
   reportAlarms(alarm('far', { tag_id: '6', reason: failed }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
@@ -207,7 +204,6 @@ test('a value that is too old says its age, and an attempt that of the last one'
       /^CriticalTag 5: Temperature 6.6\u00a0°C \(40\u00a0min ago\), below 10.0 $/,
     ),
   ]);
-  stop();
 });
 
 test('what is back in its range is to be watched', () => {
@@ -301,12 +297,11 @@ test('all is well, hardly anything is known, and nothing is', () => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: [failed, old] }));
   });
   expect(driver().textContent).toBe('1 tag cannot be assessed');
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   act(() => {
     reportAlarms(alarm('far', { tag_id: '5', reason: failed }));
   });
   expect(driver().textContent).toMatch(/^Tag 5: Last scan failed: not reachable/);
-  stop();
   act(() => {
     showTags([]);
   });
@@ -315,7 +310,7 @@ test('all is well, hardly anything is known, and nothing is', () => {
 
 test('beside an active alarm, healthy says why', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   own.set(NO_LOCAL_ALARMS);
   render(<HealthSummary kiosk={false} />);
   act(() => {
@@ -335,7 +330,6 @@ test('beside an active alarm, healthy says why', () => {
     reportAlarms(alarm('a', { cleared: 950 }));
   });
   expect(driver().textContent).toMatch(/^All assessed readings/);
-  stop();
 });
 
 test('a silent greenhouse is unknown, whatever its last verdict', () => {

@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { ageText, intervalText, numberText } from '../domain/format';
 import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
-import { ageSeconds, secondsOf } from '../domain/time';
+import { ageSeconds } from '../domain/time';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { selectClockFault, selectHasSnapshot, selectIsPaused, selectShown } from '../store/moment';
@@ -77,8 +77,7 @@ export function HouseLine(): JSX.Element | null {
   const { snapshot, moment } = useApp(selectShown);
   const isPaused = useApp(selectIsPaused);
   const interval = patrol?.interval_s ?? null;
-  const ageAt = (at: number | null): number | null =>
-    patrol?.last_scan ? ageSeconds(secondsOf(patrol.last_scan), at) : null;
+  const ageAt = (at: number | null): number | null => ageSeconds(patrol?.last_scan ?? null, at);
   const last = useShownTime((at) => {
     const age = ageAt(at);
     return age === null ? null : ageText(age);

@@ -26,11 +26,9 @@ export function HelpDialog(): JSX.Element {
   // The backdrop's clicks arrive at the dialog itself, not at its content.
   useEffect(() => {
     const element = dialog.current;
-    const onClick = (event: MouseEvent): void => {
-      if (event.target === element) element?.close();
-    };
-    element?.addEventListener('click', onClick);
-    return () => element?.removeEventListener('click', onClick);
+    element?.addEventListener('click', ({ target }) => {
+      if (target === element) element.close();
+    });
   }, []);
   return (
     <dialog id={ID} className="help" ref={dialog} aria-labelledby="help-title">

@@ -19,7 +19,7 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
 
 test('shows the scan interval, the last scan and overdue tags', () => {
   // Built states are seconds old, whatever their stamp.
-  const lineText = line({ interval_s: 4000, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
+  const lineText = line({ interval_s: 4000, last_scan: 1e-9, overdue: 2 });
   expect(lineText).toMatch(
     /^2 tags overdue · last scan .+ ago · each tag scanned every 1\u00a0h 6\u00a0min$/,
   );
@@ -87,7 +87,7 @@ test.each([
   ['not while it rests between two rounds', 1200, 1200, /^no tag overdue/],
 ])('who drives no more is looked after: %s', (_, interval_s, late, lineText) => {
   const health = judgement({ '1': 'healthy' }, undefined, {
-    ...{ interval_s, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 },
+    ...{ interval_s, last_scan: 1, overdue: 0 },
   });
   const latest = stateFrame([wireTag()], { sec: 1 + late, health });
   const show = (bridge = status()): string => {
@@ -112,7 +112,7 @@ test.each([
 });
 
 test('if the greenhouse has its own reason, that says what to do', () => {
-  const patrol = { interval_s: 1.2, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 };
+  const patrol = { interval_s: 1.2, last_scan: 1, overdue: 0 };
   const { house, tags } = judgement({ '1': 'healthy' }, undefined, patrol);
   const health = { house: { ...house, reasons: [reason({ kind: 'stopped' })] }, tags };
   const latest = stateFrame([wireTag()], { sec: 601, health });

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { rosText, secondsOf } from '../domain/time';
+import { rosText } from '../domain/time';
 import { shown } from '../domain/text';
 import type { Snapshot } from '../domain/twin';
 import { useApp, useContent, type AppState } from '../store/app';
@@ -93,7 +93,7 @@ function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): 
     return { id: 'past-nothing', title: S.pastNothing(when), hint, large };
   }
   if (pastFault) {
-    const isFuture = latest.snapshot !== null && moment > secondsOf(latest.snapshot.at);
+    const isFuture = latest.snapshot !== null && moment > latest.snapshot.at;
     const hint = isFuture && pastFault.isLasting ? S.pastFuture : shown(pastFault.message, 160);
     return { id: 'past-failed', title: S.pastFailed(when), hint, large: true };
   }

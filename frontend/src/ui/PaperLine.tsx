@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { epochOf, timeOfDay } from '../clock';
-import { dateText, rosText, secondsOf } from '../domain/time';
+import { dateText, rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHasOwnTime, selectOrigin, selectShown, selectSnapshot } from '../store/moment';
@@ -15,10 +15,9 @@ export function PaperLine(): JSX.Element | null {
   const moment = useApp((state) => selectShown(state).moment);
   const origin = useApp(selectOrigin);
   // A recording or simulation has its own time: print that, not when the data arrived.
-  const ownAt = useApp((state) => {
-    const snapshot = selectHasOwnTime(state) ? selectSnapshot(state) : null;
-    return snapshot && secondsOf(snapshot.at);
-  });
+  const ownAt = useApp((state) =>
+    selectHasOwnTime(state) ? (selectSnapshot(state)?.at ?? null) : null,
+  );
   if (takenAt === undefined) return null;
   const then = moment ?? ownAt;
   // Data may still arrive while the print dialog is open.

@@ -58,7 +58,7 @@ test.each(CASES)('$name', (state) => {
   const values = Object.entries(state.readings).map(([name, [value]]) => [name, value] as const);
   const reported = state.reasons.map(([kind, verdict, sensor, value, limit]) => ({
     ...{ kind, verdict, sensor, value, limit },
-    since: { sec: 0, nanosec: 0 },
+    since: 0,
   }));
   const judged = judgement({ 7: reported.length > 0 ? reported : state.verdict });
   expect(judged.tags['7']?.verdict).toBe(state.verdict);

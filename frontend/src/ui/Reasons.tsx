@@ -4,7 +4,7 @@ import { alarmOf, isAwaited } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { isOldReading, type TagThen } from '../domain/difference';
-import { ageSeconds, secondsOf, type When } from '../domain/time';
+import { ageSeconds, type When } from '../domain/time';
 import { byCause, causeText, todoText } from '../domain/health';
 import { useApp, type AppState } from '../store/app';
 import { useSelected } from '../store/create';
@@ -28,10 +28,7 @@ export function useCauseText(
   return useShownTime((at) => {
     const [reason] = reasons;
     if (!reason) return '';
-    const when =
-      tag && health
-        ? whenShown(reason, { tag, health }, isReceiving)
-        : reason.since && secondsOf(reason.since);
+    const when = tag && health ? whenShown(reason, { tag, health }, isReceiving) : reason.since;
     return causeText(catalogue, reasons, ageSeconds(when, at), isMarked);
   });
 }

@@ -23,31 +23,24 @@ export function SensorPicker(): JSX.Element {
   useEffect(() => {
     const row = root.current;
     if (!row) return undefined;
-    const look = (): void => {
-      const isMoreBefore = row.scrollLeft > 1;
-      const isMoreAfter = row.scrollLeft + row.clientWidth < row.scrollWidth - 1;
-      row.dataset['more'] = `${isMoreBefore ? 'before' : ''} ${isMoreAfter ? 'after' : ''}`.trim();
-    };
     const watch = new ResizeObserver(() => {
       showChosen();
-      look();
+      look(row);
     });
-    // A mouse wheel scrolls vertically; the row is horizontal.
-    const turn = ({ deltaX, deltaY }: WheelEvent): void => {
-      if (deltaX === 0) row.scrollLeft += deltaY;
-    };
     watch.observe(row);
     for (const child of row.children) watch.observe(child);
-    row.addEventListener('scroll', look, { passive: true });
-    row.addEventListener('wheel', turn, { passive: true });
-    return () => {
-      watch.disconnect();
-      row.removeEventListener('scroll', look);
-      row.removeEventListener('wheel', turn);
-    };
+    return () => watch.disconnect();
   }, []);
   return (
-    <div className="sensor-picker" ref={root}>
+    <div
+      className="sensor-picker"
+      ref={root}
+      onScroll={({ currentTarget }) => look(currentTarget)}
+      onWheel={({ currentTarget, deltaX, deltaY }) => {
+        // A mouse wheel scrolls vertically; the row is horizontal.
+        if (deltaX === 0) currentTarget.scrollLeft += deltaY;
+      }}
+    >
       <Segmented
         legend={S.sensors}
         className="sensors"
@@ -65,6 +58,13 @@ export function SensorPicker(): JSX.Element {
       />
     </div>
   );
+}
+
+/** Marks the sides where more sensors are out of view. */
+function look(row: HTMLElement): void {
+  const isMoreBefore = row.scrollLeft > 1;
+  const isMoreAfter = row.scrollLeft + row.clientWidth < row.scrollWidth - 1;
+  row.dataset['more'] = `${isMoreBefore ? 'before' : ''} ${isMoreAfter ? 'after' : ''}`.trim();
 }
 
 /** A long sensor name in short; screen readers and the tooltip have the full name. */

@@ -10,7 +10,7 @@ import { SimulatedNote } from './Header';
 
 const START = 1_763_440_800;
 const END = 1_763_700_000;
-const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
+const time = (sec: number): number => sec;
 
 const note = (): string => screen.getByTestId('simulated').textContent;
 const filled = (): StatusFrame => {

@@ -69,7 +69,7 @@ describe('card', () => {
     expect(card.textContent).toContain('pests seenInspect and treat the plants');
     expect(card.textContent).toContain('Critical');
     // Until the next inspection, however long ago this one was: its alarm is not listed any more.
-    const looked_at = { sec: nextStamp() - 9 * 86_400 - 60, nanosec: 0 };
+    const looked_at = nextStamp() - 9 * 86_400 - 60;
     const pest = reason({ kind: 'pest', sensor: '', value: 3, limit: null });
     flush(() => {
       showTags([wireTag({ tag_id: '7', looked_at })], judgement({ 7: [pest] }));
@@ -193,7 +193,7 @@ describe('card', () => {
       wireTag({
         tag_id: '7',
         stale_seconds: 2,
-        looked_at: { sec: 0, nanosec: 0 },
+        looked_at: 0,
         readings: [
           ...readings({ temperature: 20 }, nextStamp() - 7_210),
           { name: 'co2', value: 20, observed_at: null },
@@ -210,10 +210,10 @@ describe('card', () => {
   });
 
   test('a failed attempt is shown with its reason', () => {
-    const now = { sec: 5_000, nanosec: 0 };
+    const now = 5_000;
     const failing = wireTag({
       tag_id: '7',
-      last_try: { sec: 4_810, nanosec: 0 },
+      last_try: 4_810,
       last_try_status: 2,
       last_try_detail: 'no tag in the picture',
     });

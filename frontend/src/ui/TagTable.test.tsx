@@ -74,7 +74,7 @@ describe('table', () => {
   test('says first what the verdict is about, then that an attempt has failed', () => {
     const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 2 });
     const hot = reason({ verdict: 'critical', value: 40, limit: 35 });
-    const last = { last_try: { sec: 20, nanosec: 0 }, last_try_status: 2, last_try_detail: '' };
+    const last = { last_try: 20, last_try_status: 2, last_try_detail: '' };
     const tags = ['9', '10'].map((tag_id) =>
       wireTag({ tag_id, readings: readings({ temperature: 40 }), ...last }),
     );
@@ -209,11 +209,11 @@ describe('table', () => {
       tag_id: 'a',
       readings: readings({ temperature: 20.5 }, 1),
     });
-    const { at } = store.get().twin.latest.snapshot ?? { at: { sec: 0 } };
+    const { at } = store.get().twin.latest.snapshot ?? { at: 0 };
     const hourBefore = (): void => {
       flush(() => {
         hourAgo.set({
-          of: at.sec,
+          of: at,
           tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
         });
       });
@@ -230,7 +230,7 @@ describe('table', () => {
     goLive(status());
     // An outdated answer does not count.
     flush(() => {
-      hourAgo.set({ of: at.sec - 601, tags: new Map() });
+      hourAgo.set({ of: at - 601, tags: new Map() });
     });
     expect(trends()[0]).toBe('an hour ago: unknown');
     hourAgo.set(null);

@@ -3,6 +3,7 @@ import { afterEach, beforeAll, beforeEach, describe, expect, test, vi } from 'vi
 
 import { theMap, type MapActions } from '../map/commands';
 import { act, prefer, store } from '../store/app';
+import { started } from '../testing/life';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { playback } from '../timebar/playback';
@@ -19,7 +20,7 @@ const fit = vi.fn();
 beforeEach(() => {
   showTags(['1', '2', '3'].map((tag_id) => wireTag({ tag_id, readings: READINGS })));
   theMap.set({ fit } as unknown as MapActions);
-  stop = startKeys();
+  stop = started(startKeys);
 });
 afterEach(() => {
   stop();

@@ -127,7 +127,7 @@ const tagsOf = (state: State): [string, Tag][] =>
     return [id, own];
   });
 
-const SINCE = { sec: 0, nanosec: 0 };
+const SINCE = 0;
 const reasonOf = ([kind, verdict, sensor, value, limit]: ReportedReason): HealthReason => ({
   ...{ kind, verdict, sensor, value, limit },
   since: SINCE,

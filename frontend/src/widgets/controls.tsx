@@ -220,16 +220,13 @@ export function Disclosure({
     const onFocusIn = (event: FocusEvent): void => {
       if (!byFinger && isOutside(event)) setOpen(false);
     };
-    document.addEventListener('pointerdown', onPointerDown);
-    document.addEventListener('click', onClick, true);
-    document.addEventListener('keydown', onKeyDown, true);
-    document.addEventListener('focusin', onFocusIn);
-    return () => {
-      document.removeEventListener('pointerdown', onPointerDown);
-      document.removeEventListener('click', onClick, true);
-      document.removeEventListener('keydown', onKeyDown, true);
-      document.removeEventListener('focusin', onFocusIn);
-    };
+    const closed = new AbortController();
+    const { signal } = closed;
+    document.addEventListener('pointerdown', onPointerDown, { signal });
+    document.addEventListener('click', onClick, { signal, capture: true });
+    document.addEventListener('keydown', onKeyDown, { signal, capture: true });
+    document.addEventListener('focusin', onFocusIn, { signal });
+    return () => closed.abort();
   }, [open]);
 
   return (

@@ -7,6 +7,7 @@ import { alarmList, startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
 import { store } from '../../store/app';
 import { person } from '../../store/create';
+import { started } from '../../testing/life';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import { S } from '../../strings';
 import { judgement, reason } from '../../testing/health';
@@ -20,7 +21,7 @@ beforeEach(() => {
   own.set(NO_LOCAL_ALARMS);
   person.set(null);
   showTags([wireTag()]);
-  stop = startAlarms();
+  stop = started(startAlarms);
   render(<AlarmPanel />);
 });
 afterEach(() => {

@@ -1,9 +1,10 @@
 import { act as flush, fireEvent, render, screen } from '@testing-library/react';
-import { expect, test } from 'vitest';
+import { expect, onTestFinished, test } from 'vitest';
 
 import { startAlarms } from '../../alarms/watch';
 import { receive } from '../../store/app';
 import { person } from '../../store/create';
+import { started } from '../../testing/life';
 import { alarm, alarms, reportAlarms } from '../../testing/alarms';
 import { judgement } from '../../testing/health';
 import { goLive, goLost, showTags, status } from '../../testing/page';
@@ -12,7 +13,7 @@ import { AlarmPanel } from './AlarmPanel';
 
 test('how old the last value is nobody knows after a sleep', () => {
   showTags([wireTag({ readings: readings({ temperature: 8 }) })]);
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<AlarmPanel />);
   flush(() => {
     reportAlarms(alarm('a'));
@@ -25,12 +26,11 @@ test('how old the last value is nobody knows after a sleep', () => {
     receive({ isTimeLost: true });
   });
   expect(now()).toBe('now unknown, last 8.0\u00a0°C');
-  stop();
 });
 
 test('a silent twin’s values are neither back to normal nor ask for anything, and move no row', () => {
   showTags([wireTag({ readings: readings({ temperature: 20 }) })], judgement({ 1: 'healthy' }));
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   const { container } = render(<AlarmPanel />);
   flush(() => {
     reportAlarms(alarm('a'));
@@ -52,7 +52,6 @@ test('a silent twin’s values are neither back to normal nor ask for anything, 
   });
   expect(row()).toContain('Check the twin');
   expect(todo()).toBe('visible');
-  stop();
 });
 
 test('the field for a comment names its alarm', () => {
@@ -61,7 +60,7 @@ test('the field for a comment names its alarm', () => {
     ...{ name: 'anna', role: 'operator', can_write_notes: true },
     ...{ can_sign_out: true, seconds_left: null },
   });
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   render(<AlarmPanel />);
   flush(() => {
     reportAlarms(alarm('a'));
@@ -70,12 +69,11 @@ test('the field for a comment names its alarm', () => {
   fireEvent.click(screen.getByRole('button', { name: 'Comment' }));
   expect(screen.getByLabelText(/^Comment: Tag 1: Temperature below/)).toBeTruthy();
   person.set(null);
-  stop();
 });
 
 test('without a valid time nothing is being read, and what to do is as in the banner', () => {
   showTags([wireTag()]);
-  const stop = startAlarms();
+  onTestFinished(started(startAlarms));
   const { container } = render(<AlarmPanel />);
   const notes = (): string[] =>
     [...container.querySelectorAll<HTMLElement>('[data-note]')].map((it) => it.textContent);
@@ -91,5 +89,4 @@ test('without a valid time nothing is being read, and what to do is as in the ba
   const row = container.querySelector('[data-alarm]')?.textContent;
   expect(row).toContain('Check the simulation');
   expect(row).not.toContain('network');
-  stop();
 });

@@ -6,7 +6,7 @@ import { lastAction, own, undo } from '../../alarms/own';
 import { severalNow } from '../../alarms/latest';
 import { alarmList, dismissMeanwhile, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
-import { rosText, secondsOf } from '../../domain/time';
+import { rosText } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectLatestHealth } from '../../store/derived';
@@ -65,9 +65,9 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
       )}
       {isEmpty && <AlarmsWait />}
       {isEmpty && isKnown && !lacksTime && <p className="faint">{S.alarmsNoneHint}</p>}
-      {alarms?.source === 'heard' && alarms.since && (
+      {alarms?.source === 'heard' && alarms.since !== null && (
         <p className="faint" data-note="heard">
-          {S.alarmsReceived(rosText(secondsOf(alarms.since)))}
+          {S.alarmsReceived(rosText(alarms.since))}
         </p>
       )}
     </div>

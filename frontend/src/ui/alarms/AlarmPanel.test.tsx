@@ -8,6 +8,7 @@ import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
+import { started } from '../../testing/life';
 import { alarm, alarms, reportAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
 import { judgement, reason } from '../../testing/health';
@@ -19,7 +20,7 @@ beforeEach(() => {
   lastAction.set(null);
   person.set(null);
   showTags([wireTag()]);
-  const stop = startAlarms();
+  const stop = started(startAlarms);
   render(<AlarmPanel />);
   return stop;
 });
@@ -135,7 +136,7 @@ test('what is well again waits for one more good scan, and pests for an inspecti
 });
 
 test('who acknowledged it and when, by the clock of the twin', () => {
-  const said = { acknowledged_by: 'anna', acknowledged_at: { sec: 1_000, nanosec: 0 } };
+  const said = { acknowledged_by: 'anna', acknowledged_at: 1_000 };
   report(alarm('a', { tag_id: '5', ...said }));
   flush(() => {
     own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: alarm('a') }], 0));

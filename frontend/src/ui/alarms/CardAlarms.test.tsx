@@ -6,6 +6,7 @@ import { alarmList, startAlarms } from '../../alarms/watch';
 import { act, receive } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
+import { started } from '../../testing/life';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
 import { goLive, goLost, showTags } from '../../testing/page';
@@ -20,7 +21,7 @@ let stop: () => void;
 beforeEach(() => {
   own.set(NO_LOCAL_ALARMS);
   showTags([wireTag({ tag_id: '7' })]);
-  stop = startAlarms();
+  stop = started(startAlarms);
   render(<CardAlarms tagId="7" />);
 });
 afterEach(() => {
@@ -76,7 +77,7 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
 
 test('of one alarm it says who has acknowledged it, and when', () => {
   flush(() => {
-    const said = { acknowledged_by: 'vera', acknowledged_at: { sec: 950, nanosec: 0 } };
+    const said = { acknowledged_by: 'vera', acknowledged_at: 950 };
     reportAlarms(alarm('a', { tag_id: '7', ...said }));
     acknowledgeAlarms(alarmList.get().active);
   });

@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
+import { started } from '../../testing/life';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import {
   acknowledgeAlarms,
@@ -16,7 +17,7 @@ import { toast } from '../toast';
 import { merged, startPeople, sharingText, wordsFor } from './people';
 
 const COLD = alarm('cold');
-const STAMP = { sec: 1_000, nanosec: 0 };
+const STAMP = 1_000;
 const SAID = { ...COLD, acknowledged_by: 'anna', acknowledged_at: STAMP };
 const SHELVED = {
   ...COLD,
@@ -70,7 +71,7 @@ beforeEach(() => {
   reportAlarms();
   const note = {
     ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
-    ...{ made_at: { sec: 1, nanosec: 0 }, by: 'anna', withdrawn_by: null, withdrawn_at: null },
+    ...{ made_at: 1, by: 'anna', withdrawn_by: null, withdrawn_at: null },
   };
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
     const path = `${url.pathname}${url.search}`;
@@ -97,7 +98,7 @@ afterEach(() => {
 });
 
 const signedIn = async (): Promise<void> => {
-  stops.push(startPeople());
+  stops.push(started(startPeople));
   await vi.waitFor(() => {
     expect(person.get()?.name).toBe('anna');
   });
@@ -107,7 +108,7 @@ const signedIn = async (): Promise<void> => {
 test('who has signed in is known also where the bridge was away at first', async () => {
   vi.useFakeTimers();
   isAway = true;
-  stops.push(startPeople(), () => vi.useRealTimers());
+  stops.push(started(startPeople), () => vi.useRealTimers());
   await vi.advanceTimersByTimeAsync(100);
   expect(requests).toHaveLength(1);
   isAway = false;
@@ -155,7 +156,7 @@ test('undo takes back only one’s own words: what others have said since stays'
     expect(requests).toHaveLength(2);
   });
   const bert = { acknowledged_by: 'bert', acknowledged_at: STAMP };
-  const shelf = { shelved_by: 'bert', shelved_until: { ...STAMP, sec: 2_000 } };
+  const shelf = { shelved_by: 'bert', shelved_until: 2_000 };
   await vi.waitFor(() => {
     reportAlarms(SAID, { ...same, ...bert }, { ...other, ...bert, ...shelf });
     expect(own.get().shelved.size).toBe(1);

@@ -7,11 +7,10 @@ import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm, Session } from '../../contract/types';
 import { whenText } from '../../alarms/words';
 import { failureText } from '../../domain/format';
-import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
 import { keepFetched, onChange, store, useApp } from '../../store/app';
 import { rosNow, selectIsDisconnected } from '../../store/moment';
-import { person, useSelected } from '../../store/create';
+import { PAGE, person, useSelected } from '../../store/create';
 import { say } from '../toast';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -46,7 +45,7 @@ export function merged(
     const { id, acknowledged_at: at, shelved_by: by, reason } = alarm;
     const { verdict } = reason;
     const what = faultKey(alarm);
-    if (at) {
+    if (at != null) {
       isSame &&= acknowledged.has(id);
       if (!acknowledged.has(id)) acknowledged.set(id, { verdict, at: timeOfDay() });
     } else if (acknowledged.delete(id)) {
@@ -72,8 +71,8 @@ const alarmsNow = (): readonly Alarm[] => store.get().twin.alarms?.alarms ?? [];
 /** When a shelf ends by this browser's clock, ms since the epoch. */
 function endOf(alarm: Alarm): number | null {
   const nowS = rosNow(store.get(), now());
-  if (!alarm.shelved_until || nowS === null) return null;
-  return Math.floor(timeOfDay() + (secondsOf(alarm.shelved_until) - nowS) * 1000);
+  if (alarm.shelved_until == null || nowS === null) return null;
+  return Math.floor(timeOfDay() + (alarm.shelved_until - nowS) * 1000);
 }
 
 function take(): void {
@@ -135,34 +134,32 @@ async function share(before: LocalAlarms, next: LocalAlarms): Promise<void> {
   if (failure !== null || store.get().twin.alarms !== alarms) take();
 }
 
-/** Fetches the signed-in user on each connection; returns a stop function. */
-export function startPeople(): () => void {
-  const stops = [
-    // On failure, everything stays as it is until a retry succeeds.
-    keepFetched<Session>(
-      {
-        paceMs: PACE_MS,
-        parts: ({ twin }) => [twin.connection.epoch],
-        onValue: (found) => {
-          person.set(found);
-          acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
-          take();
-        },
+/** Fetches the signed-in user on each connection. */
+export function startPeople(signal = PAGE): void {
+  // On failure, everything stays as it is until a retry succeeds.
+  keepFetched<Session>(
+    {
+      paceMs: PACE_MS,
+      parts: ({ twin }) => [twin.connection.epoch],
+      onValue: (found) => {
+        person.set(found);
+        acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
+        take();
       },
-      ({ twin }) => ({
-        // The first connection opens during this fetch, to the same bridge: no need to fetch again.
-        key: String(Math.max(1, twin.connection.epoch)),
-        group: 'session',
-        run: fetchSession,
-      }),
-    ),
-    onChange(({ twin }) => [twin.alarms], take),
-  ];
-  return () => {
-    for (const stop of stops) stop();
+    },
+    ({ twin }) => ({
+      // The first connection opens during this fetch, to the same bridge: no need to fetch again.
+      key: String(Math.max(1, twin.connection.epoch)),
+      group: 'session',
+      run: fetchSession,
+    }),
+    signal,
+  );
+  onChange(({ twin }) => [twin.alarms], take, signal);
+  signal.addEventListener('abort', () => {
     acting.share = null;
     person.set(null);
-  };
+  });
 }
 
 /** Whether actions would be refused: they are shared, and the bridge does not answer. */
@@ -182,6 +179,6 @@ export function sharingText(who: Session | null): string {
 export function useWhoAcknowledged(alarm: Alarm | null): string | null {
   const name = alarm?.acknowledged_by;
   const at = alarm?.acknowledged_at;
-  const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
+  const when = useTicking((tick) => (at == null ? '' : whenText(at, rosNow(store.get(), tick))));
   return name && when !== '' ? C.acknowledged(name, when) : null;
 }

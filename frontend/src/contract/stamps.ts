@@ -1,0 +1,22 @@
+/** Stamps are ROS seconds in the page: whatever arrives passes `inSeconds`. */
+import type { components } from './openapi.gen';
+
+type Stamp = components['schemas']['Time'];
+
+/** A type of the wire with numbers for its stamps. */
+export type InSeconds<Wire> = Wire extends Stamp
+  ? number
+  : { [Key in keyof Wire]: InSeconds<Wire[Key]> };
+
+/** Replaces each stamp within a received value. */
+export function inSeconds(value: unknown): unknown {
+  if (typeof value !== 'object' || value === null) return value;
+  const { sec, nanosec } = value as Partial<Stamp>;
+  if (sec !== undefined && nanosec !== undefined) return sec + nanosec / 1e9;
+  const parts = value as Record<string, unknown>;
+  for (const key of Object.keys(parts)) {
+    const part = inSeconds(parts[key]);
+    if (part !== parts[key]) parts[key] = part;
+  }
+  return value;
+}

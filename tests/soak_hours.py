@@ -10,7 +10,7 @@ import random
 from collections.abc import Iterator
 from pathlib import Path
 
-from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import Observation, Pose, TwinStore
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.writer import Journal
@@ -26,17 +26,17 @@ LIMITS = Limits(days=36_500, max_bytes=10**11)
 MOST_WAITING = 2_000
 
 
-def scans(hour: int, chance: random.Random) -> Iterator[Scan]:
+def scans(hour: int, chance: random.Random) -> Iterator[Observation]:
     """All scans of an hour, one tag after the other."""
     rounds = 3600 // EVERY_S
     step_ns = EVERY_S * SECOND // TAGS
     for at in range(hour * rounds, (hour + 1) * rounds):
         for tag in range(TAGS):
-            values = (Reading(name, 20 + chance.random()) for name in SENSORS)
+            values = {name: 20 + chance.random() for name in SENSORS}
             pose = Pose(tag / 100, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
             stamp_ns = NOW + (at * TAGS + tag) * step_ns
-            yield Scan(
-                str(tag), stamp_ns, tuple(values), pose, source="robot", own_stamp_ns=stamp_ns
+            yield Observation(
+                str(tag), stamp_ns, values, pose, source="robot", own_stamp_ns=stamp_ns
             )
 
 

@@ -166,7 +166,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
     failing = faults(
         "--raise",
         "lupin_twin.core.state:TwinStore.record:boom-scan",
-        "lupin_twin.core.state:TwinStore.record_inspection:boom-look",
+        "lupin_twin.core.state:TwinStore.record:boom-look",
         "lupin_twin.core.state:TwinStore.pin:boom-find",
         "lupin_twin.ros.convert:map_of:width=13",
         "lupin_twin.ros.convert_services:field_request_of:boom-field",

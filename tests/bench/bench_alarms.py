@@ -13,10 +13,12 @@ from random import Random
 
 from lupin_bridge.alarms.feed import LOT
 from lupin_bridge.judge.alarm_fold import REACH_COUNT, AlarmFold
-from lupin_twin.core.past import PastWrite, RunSpan
+from lupin_twin.core.past import RunSpan
+from lupin_twin.core.state import Observation
 from tests.support.climate import DAY_NS, S, ordinary_days
 from tests.support.proc_stat import resident_mb
 from tests.support.seen import BY_LIGHT
+from tests.support.store import logged
 
 DAYS = 7
 SIZES = (1_000, 10_000)
@@ -31,7 +33,7 @@ MIDDLE = {
 CHANGES = 40
 
 
-def past_of(tags: int) -> Iterator[PastWrite]:
+def past_of(tags: int) -> Iterator[Observation]:
     """Rounds of all tags, as many as are read at a start; one reading in a hundred is far out."""
     chance = Random(11)
     rounds = REACH_COUNT // tags
@@ -42,8 +44,8 @@ def past_of(tags: int) -> Iterator[PastWrite]:
         yield write(number + 1, str(number % tags), number * step_ns, values)
 
 
-def write(number: int, tag_id: str, at_ns: int, values: list[float]) -> PastWrite:
-    return PastWrite(number, 1, tag_id, at_ns, 0, 0, tuple(MIDDLE), tuple(values))
+def write(number: int, tag_id: str, at_ns: int, values: list[float]) -> Observation:
+    return logged(number, 1, tag_id, at_ns, 0, 0, tuple(MIDDLE), tuple(values))
 
 
 def ms_since(start: float) -> float:
@@ -67,7 +69,7 @@ def alarms_of(tags: int) -> None:
     took_mb = resident_mb(os.getpid()) - before_mb
     print(f"{'':>7}  memory of that, without the scans received: {took_mb:.0f} MB")
 
-    def changed(name: str, writes: Iterable[PastWrite], now_ns: int) -> None:
+    def changed(name: str, writes: Iterable[Observation], now_ns: int) -> None:
         took = []
         for one in writes:
             start = time.thread_time()

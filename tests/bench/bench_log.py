@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.past import EVERY_TAG, Event, SeriesRequest
-from lupin_twin.core.state import Scan, TwinStore, Write
+from lupin_twin.core.state import Observation, TwinStore, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
@@ -92,7 +92,7 @@ def write(folder: Path) -> None:
 
 
 def readings(rows: Sequence[Write]) -> int:
-    return sum(len(row.readings) for row in rows if isinstance(row, Scan))
+    return sum(len(row.values) for row in rows if isinstance(row, Observation))
 
 
 def handed_to_disk() -> int:

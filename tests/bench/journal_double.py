@@ -16,7 +16,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
+from lupin_twin.core.state import Bloom, Flower, Observation, Pin, Pose, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
@@ -65,16 +65,14 @@ class Greenhouse:
                 if turn == 0:
                     yield Pin(tag_id, _place(tag), at_ns, arrival_ns)
                 if self.failing and (turn * 7 + tag) % self.failing == 0:
-                    yield Scan(
-                        tag_id, at_ns, (), None, 2, "no answer", "robot", at_ns, "", arrival_ns
+                    yield Observation(
+                        tag_id, at_ns, {}, None, 2, "no answer", "robot", at_ns, "", arrival_ns
                     )
                     continue
                 base = round(20.0 + 4.0 * by_day + (tag * 37 + turn) % 16 / 8.0, 1)
-                readings = tuple(
-                    Reading(name, base + 10.0 * index) for index, name in enumerate(SENSORS)
-                )
-                yield Scan(
-                    tag_id, at_ns, readings, None, 0, "", "robot", at_ns, "patrol", arrival_ns
+                values = {name: base + 10.0 * index for index, name in enumerate(SENSORS)}
+                yield Observation(
+                    tag_id, at_ns, values, None, 0, "", "robot", at_ns, "patrol", arrival_ns
                 )
                 if self.inspection_days and turn % inspections_every == tag % inspections_every:
                     yield _inspection(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
@@ -84,7 +82,7 @@ def _place(tag: int) -> Pose:
     return Pose(tag % 100 * 0.5, tag // 100 * 0.5, 0.3, 0.0, 0.0, 0.0, 1.0)
 
 
-def _inspection(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
+def _inspection(tag: int, at_ns: int, *, has_pest: bool) -> Observation:
     place = _place(tag)
     blooms = tuple(
         Bloom(place.x + n / 10, place.y + 0.1, 0.4, 0.25, "lupin", 0.9, anomaly=False)
@@ -92,7 +90,7 @@ def _inspection(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
     )
     flower = Flower("lupin", 0.9, has_pest, 2, int(has_pest), blooms)
     sent = ("robot", at_ns + 1, "patrol", at_ns + 60_000_000)
-    return Inspection(str(tag + 1), at_ns + 1, flower, None, 0, "", *sent)
+    return Observation(str(tag + 1), at_ns + 1, {}, None, 0, "", *sent, 1, flower)
 
 
 @dataclass(frozen=True)
@@ -127,6 +125,6 @@ def fill(path: Path, greenhouse: Greenhouse) -> Filled:
         received = greenhouse.rows()
         while lot := list(islice(received, _BATCH)):
             file.append([(run, row) for row in lot])
-            readings += sum(len(row.readings) for row in lot if isinstance(row, Scan))
+            readings += sum(len(row.values) for row in lot if isinstance(row, Observation))
             file.check_size(may_purge=False)
     return Filled(path, greenhouse, readings)

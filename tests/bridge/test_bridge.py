@@ -26,11 +26,12 @@ from lupin_bridge.settings import Secrets, Settings
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import NotRemembered, PastWrite
-from lupin_twin.core.state import Reading, Snapshot, TagState
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Observation, Reading, Snapshot, TagState
 from lupin_twin.runtime.workers import Workers
 from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm
+from tests.support.store import logged
 from tests.support.waiting import until
 
 
@@ -56,7 +57,7 @@ class Script:
         self.thread = ThreadState(is_alive=False)
         self.workers.close()
 
-    async def ask(self, *_: object) -> tuple[PastWrite, ...]:
+    async def ask(self, *_: object) -> tuple[Observation, ...]:
         raise NotRemembered("nothing")
 
     def journal(self) -> Condition:
@@ -225,11 +226,11 @@ async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.M
         answers = iter([NotRemembered("busy"), TwinUnavailableError("gone")])
         tag_id = f"t{4 * hour_ns}"
 
-        async def query(*_: object) -> tuple[PastWrite, ...]:
+        async def query(*_: object) -> tuple[Observation, ...]:
             for error in answers:
                 raise error
             return tuple(
-                PastWrite(n, 1, tag_id, hour_ns * n, 0, 0, ("co2",), (400.0,)) for n in range(1, 5)
+                logged(n, 1, tag_id, hour_ns * n, 0, 0, ("co2",), (400.0,)) for n in range(1, 5)
             )
 
         monkeypatch.setattr(stage.script, "ask", query)
@@ -372,7 +373,7 @@ async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
 ) -> None:
     requested, may_answer = asyncio.Event(), asyncio.Event()
 
-    async def query(*_: object) -> tuple[PastWrite, ...]:
+    async def query(*_: object) -> tuple[Observation, ...]:
         requested.set()
         await may_answer.wait()
         if error is not None:

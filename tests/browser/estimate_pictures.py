@@ -21,7 +21,7 @@ from playwright.sync_api import Browser, expect
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import past
 from lupin_patrol.perception import FREE, OCCUPIED, RESOLUTION_M
-from lupin_twin.core.state import Scan, Write
+from lupin_twin.core.state import Observation, Write
 from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, append
 from tests.support.messages import occupancy_grid, pose, scan
@@ -58,7 +58,11 @@ def taken(browser: Browser, folder: Path) -> None:
         now_ns = time.time_ns()
         reported, end_ns = remembered(now_ns), now_ns - GRADED_S * SECOND
         known = [row for row in reported if row.stamp_ns <= end_ns]
-        robot = Robot(row for row in reported if isinstance(row, Scan) and row.stamp_ns > end_ns)
+        robot = Robot(
+            row
+            for row in reported
+            if isinstance(row, Observation) and not row.kind and row.stamp_ns > end_ns
+        )
         append(journal, known, Clock(now_ns, now_ns, is_simulated=False))
         day = ("-p", f"day_length_s:={DAY_S}.0")
         with bridge("--ros-args", "-p", f"journal:={journal}", *day) as running:
@@ -77,7 +81,7 @@ def taken(browser: Browser, folder: Path) -> None:
 class Robot:
     """Publishes the scans of the simulated past when their time has come."""
 
-    def __init__(self, scans: Iterable[Scan]) -> None:
+    def __init__(self, scans: Iterable[Observation]) -> None:
         self._scans = sorted(scans, key=lambda each: each.stamp_ns)
 
     def go_on(self, running: Bridge) -> None:
@@ -91,12 +95,11 @@ class Robot:
             running.tag(lot[-1].tag_id, partial(is_reported, lot[-1]))
 
 
-def message_of(row: Scan) -> Any:
-    readings = {each.name: each.value for each in row.readings}
-    return scan(row.tag_id, readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
+def message_of(row: Observation) -> Any:
+    return scan(row.tag_id, row.values, status=row.status, stamp_s=row.stamp_ns / SECOND)
 
 
-def is_reported(row: Scan, tag: dict[str, Any]) -> bool:
+def is_reported(row: Observation, tag: dict[str, Any]) -> bool:
     attempted = filled(tag)["last_try"]
     return attempted is not None and attempted["sec"] >= row.stamp_ns // SECOND
 

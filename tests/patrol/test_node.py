@@ -27,7 +27,8 @@ from lupin_patrol.cli import parser
 from lupin_patrol.greenhouse import Rect
 from lupin_patrol.mission import PassCompleted, ScanStatus, Visited, pose_of
 from lupin_patrol.node import PatrolNode
-from lupin_twin.core.state import Bloom, Flower, Inspection, Scan
+from lupin_twin.core import state
+from lupin_twin.core.state import Bloom, Flower
 from tests.support.domains import ros_env
 from tests.support.inprocess import ros_domain
 from tests.support.processes import Process
@@ -244,7 +245,7 @@ BLOOM = Bloom(1.5, 2.2, 0.6, 0.25, "lupin", 0.875, anomaly=True)
 BOX = Rect(1.0, 2.0, 2.0, 2.25)
 CORNERS = tuple((x, y, 0.0) for x, y in BOX.corners)
 FLOWER = Flower("lupin", 0.75, True, 12, 3, (BLOOM,), CORNERS)
-FLOWERS = Visited(3.2, 4, 0.0, Inspection("7", 0, FLOWER, POSE))
+FLOWERS = Visited(3.2, 4, 0.0, state.Observation("7", 0, pose=POSE, kind=1, flower=FLOWER))
 
 
 def over_the_wire(message: Any) -> Any:
@@ -262,7 +263,7 @@ def over_the_wire(message: Any) -> Any:
     ],
 )
 def test_a_failed_scan_has_a_reason_and_no_pose(status: ScanStatus, expected: int) -> None:
-    failed = Visited(3.0, 0, 0.0, Scan("7", 0, (), None, status, "the way is blocked"))
+    failed = Visited(3.0, 0, 0.0, state.Observation("7", 0, {}, None, status, "the way is blocked"))
     message = over_the_wire(node.observation(failed, STAMP_NS, "map"))
     assert message.status == expected
     assert message.status_detail == "the way is blocked"

@@ -9,7 +9,7 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 from lupin_patrol.cli import fill_past, parser
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import DAYS, PAST_SOURCE, START_OF_DAY_S, past
-from lupin_twin.core.state import Pin, Scan, Write
+from lupin_twin.core.state import Observation, Pin, Write
 from tests.support.climate import Truth
 from tests.support.journal import NOW, append, scan, select
 
@@ -33,8 +33,8 @@ def rows() -> list[Write]:
 
 
 @pytest.fixture(scope="module")
-def scans(rows: list[Write]) -> list[Scan]:
-    return [row for row in rows if isinstance(row, Scan)]
+def scans(rows: list[Write]) -> list[Observation]:
+    return [row for row in rows if isinstance(row, Observation) and not row.kind]
 
 
 def test_it_is_three_days_of_the_demos_own_length_up_to_now(rows: list[Write]) -> None:
@@ -44,7 +44,7 @@ def test_it_is_three_days_of_the_demos_own_length_up_to_now(rows: list[Write]) -
     assert -10 < times[-1] < 0
 
 
-def test_every_tag_is_scanned_in_every_round_and_some_scans_fail(scans: list[Scan]) -> None:
+def test_every_tag_is_scanned_in_every_round_and_some_scans_fail(scans: list[Observation]) -> None:
     tags = {tag.tag_id for tag in read_greenhouse(GreenhouseSimulator()).tags}
     last = int(scans[-1].mission.removeprefix("past-"))
     assert last > 50
@@ -54,7 +54,7 @@ def test_every_tag_is_scanned_in_every_round_and_some_scans_fail(scans: list[Sca
         failed = [row for row in attempted if row.status]
         assert {row.status for row in failed} == {1, 2}
         assert all(row.status_detail for row in failed)
-        assert not any(row.readings for row in failed)
+        assert not any(row.values for row in failed)
 
 
 def test_each_tag_gets_its_exact_position_before_anything_else(rows: list[Write]) -> None:
@@ -68,10 +68,10 @@ def test_each_tag_gets_its_exact_position_before_anything_else(rows: list[Write]
         if isinstance(row, Pin):
             assert row.tag_id not in placed, "it is pinned once"
             placed.add(row.tag_id)
-        assert row.tag_id in placed or (isinstance(row, Scan) and row.status)
+        assert row.tag_id in placed or (isinstance(row, Observation) and row.status)
 
 
-def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
+def test_its_time_of_day_is_that_of_the_patrol(scans: list[Observation]) -> None:
     """Readings follow the climate's own curve, at the time of day that leads up to the start."""
     tags = {tag.tag_id: tag for tag in read_greenhouse(GreenhouseSimulator()).tags}
     truth = Truth(GreenhouseSimulator())
@@ -79,7 +79,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
     def off_by(hours: float) -> float:
         return fmean(
             abs(
-                reading.value
+                row.values["temperature"]
                 - truth.of(
                     "temperature",
                     tags[row.tag_id].position,
@@ -87,8 +87,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
                 )
             )
             for row in scans
-            for reading in row.readings
-            if reading.name == "temperature"
+            if "temperature" in row.values
         )
 
     assert off_by(0) < min(off_by(hours) for hours in (-2, -1, 1, 2)) / 1.5

@@ -7,7 +7,8 @@ from itertools import groupby, pairwise
 from statistics import median
 
 from lupin_bridge.judge.quantities import Sensors, dew_point_c, vapour_pressure_deficit_kpa
-from lupin_twin.core.past import PastWrite, RunSpan
+from lupin_twin.core.past import RunSpan
+from lupin_twin.core.state import Observation
 
 S = 1_000_000_000
 SHORTEST, LONGEST = 600 * S, 86_400 * S
@@ -51,7 +52,7 @@ class _Said:
 
 
 def alarms(
-    received: Iterable[PastWrite],
+    received: Iterable[Observation],
     spans: Sequence[RunSpan],
     now_ns: int,
     sensors: Sensors,
@@ -75,25 +76,21 @@ def alarms(
     return found
 
 
-def _mine(tag_id: str, of_run: list[PastWrite]) -> list[list[PastWrite]]:
+def _mine(tag_id: str, of_run: list[Observation]) -> list[list[Observation]]:
     mine = [write for write in of_run if write.tag_id == tag_id]
     return [list(group) for _, group in groupby(mine, key=lambda write: write.stamp_ns)]
 
 
-def _readings(occasion: list[PastWrite]) -> dict[str, float]:
-    return {
-        name: value
-        for write in occasion
-        for name, value in zip(write.sensors, write.values, strict=True)
-    }
+def _readings(occasion: list[Observation]) -> dict[str, float]:
+    return {name: value for write in occasion for name, value in write.values.items()}
 
 
-def _light(of_run: list[PastWrite], at_ns: int) -> bool | None:
+def _light(of_run: list[Observation], at_ns: int) -> bool | None:
     latest: dict[str, tuple[int, float]] = {}
     scanned: dict[str, int] = {}
     for write in of_run:
         if write.stamp_ns <= at_ns:
-            for name, value in zip(write.sensors, write.values, strict=True):
+            for name, value in write.values.items():
                 scanned[write.tag_id] = write.stamp_ns
                 if name == "light":
                     latest[write.tag_id] = write.stamp_ns, value
@@ -108,7 +105,7 @@ def _light(of_run: list[PastWrite], at_ns: int) -> bool | None:
 
 def _of_tag(
     tag_id: str,
-    of_run: list[PastWrite],
+    of_run: list[Observation],
     sensors: Sensors,
     day_of: Callable[[bool | None, int], bool],
     *,
@@ -121,8 +118,8 @@ def _of_tag(
     species = ""
     for occasion in occasions:
         at = occasion[0].stamp_ns
-        seen = (w.species for w in reversed(occasion) if w.has_seen and w.species)
-        species = next(seen, species)
+        seen = (w.flower.sure_species for w in reversed(occasion) if w.flower)
+        species = next(filter(None, seen), species)
         is_day = day_of(_light(of_run, at), at)
         for key, message in (
             *_of_readings(occasion, sensors),
@@ -141,7 +138,7 @@ def _of_tag(
 _Key = tuple[str, str, str]
 
 
-def _of_readings(occasion: list[PastWrite], sensors: Sensors) -> Iterator[tuple[_Key, _Said]]:
+def _of_readings(occasion: list[Observation], sensors: Sensors) -> Iterator[tuple[_Key, _Said]]:
     for name, value in _readings(occasion).items():
         if name not in ("vpd", "dew_point", "condensation_margin"):
             bad, span = not sensors.named(name).is_plausible(value), sensors.named(name).plausible
@@ -153,7 +150,7 @@ def _of_readings(occasion: list[PastWrite], sensors: Sensors) -> Iterator[tuple[
 
 
 def _of_ranges(
-    occasion: list[PastWrite], sensors: Sensors, species: str, *, is_day: bool
+    occasion: list[Observation], sensors: Sensors, species: str, *, is_day: bool
 ) -> Iterator[tuple[_Key, _Said]]:
     at = occasion[0].stamp_ns
     readings = _readings(occasion)
@@ -183,7 +180,7 @@ def _of_ranges(
 
 
 def _of_silent_sensors(
-    at: int, occasions: list[list[PastWrite]], scans: list[int]
+    at: int, occasions: list[list[Observation]], scans: list[int]
 ) -> Iterator[tuple[_Key, _Said]]:
     reported: dict[str, list[int]] = {}
     for occasion in occasions:
@@ -199,13 +196,13 @@ def _of_silent_sensors(
         yield ("old", name, ""), message
 
 
-def _of_attempts(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Key, _Said]]:
+def _of_attempts(occasion: list[Observation], scans: list[int]) -> Iterator[tuple[_Key, _Said]]:
     at = occasion[0].stamp_ns
     for kind, status in {w.kind: w.status for w in occasion}.items():
         bad = status != 0
         message = _Said(at, bad, bad, "unknown", float(status), scans=tuple(scans[-9:]))
         yield ("scan_failed", "", str(kind)), message
-    looks = [w for w in occasion if w.kind == FLOWER and w.has_seen]
+    looks = [w.flower for w in occasion if w.kind == FLOWER and w.flower]
     if looks:
         seen, bugs = looks[-1].anomaly, float(looks[-1].bug_count)
         verdict = "critical" if bugs else "stressed"
@@ -270,16 +267,16 @@ def _holds(scans: list[int]) -> int:
     return min(LONGEST, max(SHORTEST, 3 * int(median(intervals))))
 
 
-def _scans(tag_id: str, of_run: list[PastWrite]) -> list[int]:
+def _scans(tag_id: str, of_run: list[Observation]) -> list[int]:
     return [group[0].stamp_ns for group in _mine(tag_id, of_run) if _readings(group)]
 
 
-def _pauses(of_run: list[PastWrite]) -> list[tuple[int, int]]:
+def _pauses(of_run: list[Observation]) -> list[tuple[int, int]]:
     stamps = sorted({write.stamp_ns for write in of_run})
     return [(one, other) for one, other in pairwise(stamps) if other - one > SHORTEST]
 
 
-def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[Plain]:
+def _overdue(tag_id: str, of_run: list[Observation], *, is_on: bool) -> Iterator[Plain]:
     scans, last_ns = _scans(tag_id, of_run), of_run[-1].stamp_ns
     for index, start in enumerate(scans):
         end = scans[index + 1] if index + 1 < len(scans) else None
@@ -295,7 +292,7 @@ def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[P
             yield Plain(tag_id, "old", "", "unknown", None, holds / 1e9, start, due, cleared, None)
 
 
-def _of_greenhouse(of_run: list[PastWrite], now_ns: int | None) -> Iterator[Plain]:
+def _of_greenhouse(of_run: list[Observation], now_ns: int | None) -> Iterator[Plain]:
     pauses: list[tuple[int, int | None]] = [*_pauses(of_run)]
     last_ns = of_run[-1].stamp_ns
     if now_ns is not None and now_ns - last_ns > SHORTEST:

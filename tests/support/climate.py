@@ -9,8 +9,7 @@ from greenhouse_sim.simulator import GreenhouseSimulator, SensorRegistry
 from lupin_patrol.greenhouse import Point
 from lupin_patrol.mission import DAYS, past
 from lupin_patrol.perception import UNKNOWN, Grid, value_of
-from lupin_twin.core.past import PastWrite
-from lupin_twin.core.state import Pin
+from lupin_twin.core.state import Observation, Pin
 from tests.support.journal import past_write
 
 
@@ -42,7 +41,7 @@ DAY_NS: Final = 86_400 * S
 _DAY_SPEED: Final = 60.0
 
 
-def ordinary_days() -> list[PastWrite]:
+def ordinary_days() -> list[Observation]:
     """Scans and inspections of three days, from 0 ns on, as a journal returns them."""
     rows = past(GreenhouseSimulator(), 0, _DAY_SPEED, 1.0, 0)
     reported = (row for row in rows if not isinstance(row, Pin))

@@ -3,13 +3,12 @@
 import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from lupin_twin.core.diagnostics import Condition, JournalState
-from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import PastWrite
-from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
+from lupin_twin.core.state import KIND_FLOWER, Bloom, Flower, Observation, Pin, Pose, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
@@ -24,11 +23,13 @@ LIMITS = Limits(days=36_500, max_bytes=4_000_000_000)
 CLOCK = Clock(NOW, NOW, is_simulated=False)
 
 
-def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float) -> Scan:
-    return Scan(
+def scan(
+    tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float
+) -> Observation:
+    return Observation(
         tag_id,
         at_ns,
-        tuple(Reading(name, value) for name, value in (readings or {"temperature": 21.5}).items()),
+        readings or {"temperature": 21.5},
         source=source,
         own_stamp_ns=at_ns,
         mission="m1",
@@ -36,7 +37,7 @@ def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readin
     )
 
 
-def inspection(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspection:
+def inspection(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Observation:
     """An inspection of two flowers."""
     flower = Flower(
         species="lupin",
@@ -50,23 +51,18 @@ def inspection(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) ->
         ),
         footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.1)),
     )
-    return Inspection(tag_id, at_ns, flower, source="robot", mission="m1", arrival_ns=at_ns + 2000)
+    reported = {"source": "robot", "mission": "m1", "arrival_ns": at_ns + 2000}
+    return Observation(tag_id, at_ns, kind=KIND_FLOWER, flower=flower, **reported)  # type: ignore[arg-type]
 
 
 def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> Pin:
     return Pin(tag_id, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
 
 
-def past_write(number: int, run: int, row: Scan | Inspection) -> PastWrite:
-    """A row as queries of the log return it: an uncertain species is left out."""
-    if isinstance(row, Inspection) and row.flower is not None:
-        flower = row.flower
-        species = flower.species if flower.confidence >= 0.5 else ""
-        seen = (True, species, flower.anomaly, flower.bug_count)
-        return PastWrite(number, run, row.tag_id, row.stamp_ns, 1, 0, (), (), *seen)
-    pairs = [(it.name, it.value) for it in getattr(row, "readings", ())]
-    names, values = zip(*pairs, strict=True) if pairs else ((), ())
-    return PastWrite(number, run, row.tag_id, row.stamp_ns, kind_of(row), row.status, names, values)
+def past_write(number: int, run: int, row: Observation) -> Observation:
+    """A row as queries of the log return it."""
+    flower = row.flower and replace(row.flower, blooms=(), footprint=())
+    return replace(row, number=number, run=run, pose=None, flower=flower)
 
 
 @contextmanager

@@ -12,9 +12,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
+from lupin_twin.core.history import KNOWN_BY_NOTHING
 from lupin_twin.core.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.core.state import STATUS_OK, Flower, Inspection, Pin, Scan, Write
+from lupin_twin.core.state import STATUS_OK, Flower, Observation, Pin, Write
 from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.retention import Limits, purge_step
 from lupin_twin.journal.runs import runs, spans
@@ -30,15 +30,16 @@ SILENCE_NS = 600 * SECOND
 Entry = tuple[int, int, float]  # stamp, number, value
 
 
-def failure(
-    tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0
-) -> Scan | Inspection:
-    reported = (None, status, "no", "robot", 0, "", at_ns + 1000)
-    return Inspection(tag, at_ns, None, *reported) if kind else Scan(tag, at_ns, (), *reported)
+def failure(tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0) -> Observation:
+    return Observation(tag, at_ns, {}, None, status, "no", "robot", 0, "", at_ns + 1000, kind)
 
 
 def _seen(row: Write) -> Flower | None:
-    return row.flower if isinstance(row, Inspection) else None
+    return None if isinstance(row, Pin) else row.flower
+
+
+def _is_scan(row: Write) -> bool:
+    return isinstance(row, Observation) and not row.kind
 
 
 def longest(tags: Iterable[list[int]]) -> float:
@@ -74,21 +75,19 @@ class Life:
         """The new part of it: of a known write, other sensors."""
         if isinstance(row, Pin):
             return row
-        key = (self.run, row.tag_id, kind_of(row), row.stamp_ns, row.source)
+        key = (self.run, row.tag_id, row.kind, row.stamp_ns, row.source)
         known = self._known.get(key)
         sensors = self._known.setdefault(key, set())
-        if isinstance(row, Scan):
-            row = replace(row, readings=tuple(r for r in row.readings if r.name not in sensors))
-            sensors |= {reading.name for reading in row.readings}
-            return row if known is None or row.readings else None
-        return row if known is None else None
+        row = replace(row, values={it: v for it, v in row.values.items() if it not in sensors})
+        sensors.update(row.values)
+        return row if known is None or row.values else None
 
     def begin(self, at_ns: int, ended_ns: int | None = None) -> None:
         """A clock that is new, or has gone back; the latest of what was known is copied."""
         before, self.run = self.run, self.run + 1
         for run, row in self.rows:
             if run == before:
-                self._copied[type(row), row.tag_id] = row
+                self._copied[getattr(row, "kind", None), row.tag_id] = row
         for key, row in self._copied.items():
             self._copied[key] = replace(row, stamp_ns=min(row.stamp_ns, at_ns))
         with transaction(self.connection):
@@ -128,11 +127,9 @@ class Life:
 
     def readings(self, tag_id: str, sensor: str) -> list[Entry]:
         return sorted(
-            (row.stamp_ns, number, reading.value)
+            (row.stamp_ns, number, row.values[sensor])
             for number, row in self._of(tag_id)
-            if isinstance(row, Scan)
-            for reading in row.readings
-            if reading.name == sensor
+            if isinstance(row, Observation) and sensor in row.values
         )
 
     def events(self, tag_id: str, event: Event) -> list[Entry]:
@@ -147,8 +144,8 @@ class Life:
                 value = flower.bug_count if event is Event.INSPECTIONS else None
             elif row.status != STATUS_OK and event is Event.FAILURES:
                 value = row.status
-            elif isinstance(row, Scan) and row.status == STATUS_OK and event is Event.SCANS:
-                value = len(row.readings)
+            elif not row.kind and row.status == STATUS_OK and event is Event.SCANS:
+                value = len(row.values)
             if value is not None:
                 found.append((row.stamp_ns, number, float(value)))
         return sorted(found)
@@ -181,7 +178,7 @@ class Life:
         for span in spans(runs(self.connection.execute)):
             last_run = span.run if span.start_ns < end_ns else last_run
         for number, row in self._of(tag_id):
-            if isinstance(row, Scan) and row.stamp_ns < end_ns and self.rows[number][0] == last_run:
+            if _is_scan(row) and row.stamp_ns < end_ns and self.rows[number][0] == last_run:
                 scans.setdefault(row.tag_id, set()).add(row.stamp_ns)
         longest_ns = longest(sorted(stamps) for stamps in scans.values())
         if attempts:
@@ -214,8 +211,7 @@ class Life:
             if number in held:
                 found += [
                     PastRow(stamp_ns, row.tag_id, x, y, name, value, row.status, row.source)
-                    for name, value in [(r.name, r.value) for r in getattr(row, "readings", ())]
-                    or [("", math.nan)]
+                    for name, value in row.values.items() or [("", math.nan)]
                 ]
         return found
 

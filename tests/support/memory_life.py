@@ -7,18 +7,7 @@ from typing import Any
 
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
-from lupin_twin.core.history import kind_of
-from lupin_twin.core.ingest import Received
-from lupin_twin.core.state import (
-    Flower,
-    Inspection,
-    Pose,
-    Reading,
-    Scan,
-    Snapshot,
-    TagState,
-    TwinStore,
-)
+from lupin_twin.core.state import Flower, Observation, Pose, Snapshot, TagState, TwinStore
 from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
@@ -83,13 +72,8 @@ class Twin:
             "source": source,
             "own_stamp_ns": stamp_ns,
         }
-        sent = (
-            Scan(tag, 0, tuple(Reading(*each) for each in readings.items()), **of)
-            if flower is None
-            else Inspection(tag, 0, flower, **of)
-        )
-        received = Received(kind_of(sent), "", sent)
-        write = ingest.observation(received, "map", self.now_ns)
+        sent = Observation(tag, 0, readings, kind=int(flower is not None), flower=flower, **of)
+        write = ingest.observation("", sent, "map", self.now_ns)
         assert not isinstance(write, Drop)
         assert self.memory.apply(write, self.wall_ns) is None
 

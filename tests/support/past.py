@@ -16,13 +16,12 @@ from lupin_twin.core.past import (
     Event,
     NotRemembered,
     PastRow,
-    PastWrite,
     PastWrites,
     SeriesPast,
     SeriesRequest,
     WritesRequest,
 )
-from lupin_twin.core.state import Inspection, Scan, Snapshot
+from lupin_twin.core.state import Observation, Snapshot
 from lupin_twin.estimate.engine import TagPast
 from lupin_twin.runtime.workers import Workers
 
@@ -47,7 +46,7 @@ class MadeUp:
     points: dict[tuple[str, str], list[tuple[int, float]]] = field(default_factory=dict)
     lots: list[list[PastRow]] = field(default_factory=list)
     snapshot: Snapshot = field(default_factory=lambda: Snapshot(0, "map", ()))
-    scanned: tuple[PastWrite, ...] = ()
+    scanned: tuple[Observation, ...] = ()
     pasts: list[TagPast] = field(default_factory=list)
     error: Exception | None = None
     requested: list[object] = field(default_factory=list)
@@ -73,7 +72,7 @@ class MadeUp:
         self._note(at_ns)
         return replace(self.snapshot, stamp_ns=at_ns)
 
-    def recent(self, at_ns: int) -> tuple[PastWrite, ...]:
+    def recent(self, at_ns: int) -> tuple[Observation, ...]:
         """What was scanned; usually nothing: the state has everything."""
         self._note(at_ns)
         return self.scanned
@@ -82,11 +81,11 @@ class MadeUp:
         """What an estimate is made of."""
         return self.pasts
 
-    def scans(self, *_: object) -> tuple[PastWrite, ...]:
+    def scans(self, *_: object) -> tuple[Observation, ...]:
         """Nothing before that."""
         return ()
 
-    def latest(self, *_: object) -> list[Scan | Inspection]:
+    def latest(self, *_: object) -> list[Observation]:
         """Nothing: the state is ahead of the log."""
         return []
 

@@ -33,18 +33,17 @@ from lupin_twin.core.past import (
     FOREVER_NS,
     NotRemembered,
     PastRefused,
-    PastWrite,
     PastWrites,
     RunSpan,
 )
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import Observation, Snapshot, TagState
 
 # The run of the clock of all writes that are made from states.
 RUN = 0
 _NO_TAG = TagState("")
 
 
-def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[PastWrite]:
+def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[Observation]:
     """What happened between two states (see `writes_of`), numbered from `number` on."""
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
     found = [
@@ -108,7 +107,7 @@ class AlarmFeed:
         self.missed = 0
         self._alarm_source: AlarmSource = "journal"
         self._seen: Snapshot | None = None
-        self._received: list[PastWrite] = []
+        self._received: list[Observation] = []
         self._received_number = _FIRST_RECEIVED
         self._silences: list[Alarm] = []
         # The last known time of the twin.

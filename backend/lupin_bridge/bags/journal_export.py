@@ -30,7 +30,7 @@ from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal import sql
 from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, cut, runs, spans
-from lupin_twin.journal.schema import LOCAL_SITE, one_view
+from lupin_twin.journal.schema import LOCAL_SITE, SiteLog, one_view
 from lupin_twin.ros.convert import observation_message, pose_message, time_msg
 
 # A QoS profile as rosbag2 writes it since version 9 of its metadata (Jazzy), which it also assumes
@@ -102,9 +102,9 @@ class JournalRows:
         for start in range(0, len(seqs), LOT):
             lot = seqs[start : start + LOT]
             rows = [
-                (seq, run, row)
+                (row.number, run, row)
                 for run in self.runs.values()
-                for seq, row in listed_rows(self._connection, run.id, lot, lot)
+                for row in listed_rows(SiteLog(self._connection), run.id, lot, lot)
                 if self._holds(run, row.stamp_ns)
             ]
             yield from sorted(rows, key=itemgetter(0))

@@ -35,7 +35,7 @@ from lupin_twin.adapt.table import (
 )
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH, check_length
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Pose, Reading, Scan, Write
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Observation, Pin, Pose, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.paths import Lock
 from lupin_twin.journal.retention import Limits
@@ -407,11 +407,10 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             rows: list[tuple[Run, Write]] = []
             for stamp_ns, tag_id, values in batch:
                 span = span_at(known, stamp_ns) if len(known) > 1 else None
-                readings = tuple(map(Reading, values, values.values()))
-                scan = Scan(
+                scan = Observation(
                     tag_id,
                     stamp_ns,
-                    readings,
+                    values,
                     source="import",
                     own_stamp_ns=stamp_ns,
                     arrival_ns=stamp_ns,

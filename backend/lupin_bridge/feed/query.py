@@ -26,17 +26,17 @@ from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import (
     PastRow,
-    PastWrite,
     PastWrites,
     SeriesPast,
     SeriesRequest,
     WritesRequest,
     check_moment,
 )
-from lupin_twin.core.state import Inspection, Scan, Snapshot
+from lupin_twin.core.state import Observation, Snapshot
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.rows import latest
+from lupin_twin.journal.schema import SiteLog
 from lupin_twin.journal.writes import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.process import return_large_blocks
@@ -85,12 +85,12 @@ class LogReader:
         """See `queries.series`."""
         return series(self.connection, request, self._now.stamp_ns)
 
-    def recent(self, at_ns: int) -> tuple[PastWrite, ...]:
+    def recent(self, at_ns: int) -> tuple[Observation, ...]:
         """See `writes.recent`; raises as `state` does."""
         check_moment(at_ns, self._now.stamp_ns)
         return recent(self.connection, at_ns)
 
-    def scans(self, since_ns: int, at_ns: int, sensors: Collection[str]) -> tuple[PastWrite, ...]:
+    def scans(self, since_ns: int, at_ns: int, sensors: Collection[str]) -> tuple[Observation, ...]:
         """See `writes.scans`; raises as `state` does."""
         check_moment(at_ns, self._now.stamp_ns)
         return scans(self.connection, since_ns, at_ns, sensors)
@@ -103,9 +103,9 @@ class LogReader:
         """See `writes.observed`."""
         return observed(self.connection, start_ns, end_ns)
 
-    def latest(self, tag_id: str, count: int) -> list[Scan | Inspection]:
+    def latest(self, tag_id: str, count: int) -> list[Observation]:
         """See `rows.latest`."""
-        return latest(self.connection, tag_id, count)
+        return latest(SiteLog(self.connection), tag_id, count)
 
     def readings(
         self, sensor: str, at_ns: int, day_length_s: float, days: float = 1.0

@@ -16,7 +16,7 @@ from struct import Struct
 from typing import Any, Final, Generic
 
 from builtin_interfaces.msg import Time
-from lupin_msgs.msg import Observation
+from lupin_msgs.msg import Observation as ObservationMsg
 from rclpy.callback_groups import CallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import InvalidTopicNameException
@@ -43,7 +43,7 @@ from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.interfaces import Topic
 from lupin_twin.core.parameters import FARTHEST_M
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Observation
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
@@ -408,14 +408,14 @@ class RosSource(TwinSource, Generic[NodeT]):
 
     takes_observations = True
 
-    async def publish_observation(self, scan: Scan) -> None:
+    async def publish_observation(self, scan: Observation) -> None:
         """See `TwinSource`."""
         topic = self.names.observations_topic
 
         def publish(node: Any) -> None:
             if self._observations is None:
                 self._observations = node.create_publisher(
-                    Observation, topic, qos_of(interfaces.OBSERVATIONS)
+                    ObservationMsg, topic, qos_of(interfaces.OBSERVATIONS)
                 )
             self._observations.publish(convert.observation_message(scan, ""))
 

@@ -24,7 +24,7 @@ from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS, NotRemembered, PastRow, PastWrites, WritesRequest
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan, Snapshot
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Observation, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.writes import NOTES_S, STRETCH_S, WRITES_S, Export
@@ -318,7 +318,7 @@ class TwinSource(ABC):
     # Whether there is a ROS node that can publish.
     takes_observations = False
 
-    async def publish_observation(self, scan: Scan) -> None:
+    async def publish_observation(self, scan: Observation) -> None:
         """Publish readings over ROS, as a robot does; the twin may still reject them.
 
         Raises:

@@ -37,9 +37,8 @@ from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import (
     FOREVER_NS,
     NotRemembered,
-    PastWrite,
 )
-from lupin_twin.core.state import Snapshot, TagState, same_tags
+from lupin_twin.core.state import Observation, Snapshot, TagState, same_tags
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
@@ -344,7 +343,7 @@ class Watcher:
             judged.judge.note_writes(past.of_newest_run)
 
 
-def _recent(log: Any, at_ns: int) -> list[PastWrite]:
+def _recent(log: Any, at_ns: int) -> list[Observation]:
     return recent_writes(at_ns, LogReader(log, Now(at_ns, "", UNKNOWN_JOURNAL)))
 
 

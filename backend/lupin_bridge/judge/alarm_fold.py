@@ -21,14 +21,13 @@ from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.core.past import (
     FOREVER_NS,
     HOUR_NS,
-    PastWrite,
     PastWrites,
     RunSpan,
     WritesRequest,
 )
-from lupin_twin.core.state import Reading, TagState
+from lupin_twin.core.state import Observation, Reading, TagState
 
-# Writes kept for all tags together, roughly; each tag has an equal share. They take 9 MB.
+# Writes kept for all tags together, roughly; each tag has an equal share. They take 13 MB.
 KEPT: Final = 20_000
 # Interval of dropping what is over and no longer reported.
 FORGET_EVERY_NS: Final = HOUR_NS
@@ -102,7 +101,7 @@ class AlarmFold:
         self._is_other = True
         self._alarms: tuple[Alarm, ...] = ()
 
-    def take(self, writes: Iterable[PastWrite]) -> None:
+    def take(self, writes: Iterable[Observation]) -> None:
         """Take writes, in the order of receipt."""
         for write in writes:
             if write.stamp_ns < self._forgotten_ns:
@@ -151,7 +150,7 @@ class AlarmFold:
 
     # --- taking in -----------------------------------------------------------------------------
 
-    def _take(self, run: _Run, write: PastWrite) -> None:
+    def _take(self, run: _Run, write: Observation) -> None:
         tag = run.tags.get(write.tag_id)
         if tag is None:
             self._tags += 1

@@ -19,8 +19,8 @@ from operator import itemgetter
 from typing import Final, Literal, TypeVar
 
 from lupin_bridge.judge.quantities import DAILY, Course, IsDay, Sensors
-from lupin_twin.core.past import DAY_NS, PastWrite
-from lupin_twin.core.state import Reading
+from lupin_twin.core.past import DAY_NS
+from lupin_twin.core.state import Observation, Reading
 
 # The name of the light sensor.
 LIGHT: Final = "light"
@@ -269,12 +269,12 @@ def _by_the_minute(of: Callable[[int], ValueT]) -> Callable[[int], ValueT]:
 
 
 def days_of(
-    scans: Iterable[PastWrite], sensors: Sensors, is_day: IsDay, number: DayNumber
+    scans: Iterable[Observation], sensors: Sensors, is_day: IsDay, number: DayNumber
 ) -> Mapping[str, Sequence[Reading]]:
     """By tag, the daily quantities of its last day; `scans`: the last `SINCE_NS`, oldest first."""
     every: dict[str, dict[str, dict[int, float]]] = {}
     for scan in scans:
-        for name, value in zip(scan.sensors, scan.values, strict=True):
+        for name, value in scan.values.items():
             # For one moment, the value received last counts.
             every.setdefault(scan.tag_id, {}).setdefault(name, {})[scan.stamp_ns] = value
     is_day, number = _by_the_minute(is_day), _by_the_minute(number)

@@ -40,9 +40,8 @@ from lupin_bridge.judge.verdict import (
     pest,
     worst,
 )
-from lupin_twin.core.history import KIND_FLOWER
-from lupin_twin.core.past import FOREVER_NS, PastWrite, interval_ns
-from lupin_twin.core.state import STATUS_OK, Reading
+from lupin_twin.core.past import FOREVER_NS, interval_ns
+from lupin_twin.core.state import STATUS_OK, Observation, Reading
 
 # The `tag_id` of an alarm of the whole greenhouse.
 SITE = ""
@@ -183,13 +182,13 @@ class TagEpisodes:
         raised = (it.began_ns for it in self._watches.values() if it.raised_at_ns is not None)
         return self._first_ns in raised
 
-    def step(self, writes: Sequence[PastWrite], is_day: IsDay) -> None:
+    def step(self, writes: Sequence[Observation], is_day: IsDay) -> None:
         """Take the next occasion: `writes` of one stamp, in the order of receipt."""
         stamp_ns = writes[0].stamp_ns
         self._first_ns = min(self._first_ns, stamp_ns)
         for write in writes:
-            if write.has_seen and write.species:
-                self._species = write.species
+            if write.flower is not None and write.flower.sure_species:
+                self._species = write.flower.sure_species
         readings = readings_of(writes)
         if readings:
             self._scans_ns = (*self._scans_ns, stamp_ns)[-INTERVALS - 1 :]
@@ -203,7 +202,7 @@ class TagEpisodes:
 
     def _findings(
         self,
-        writes: Sequence[PastWrite],
+        writes: Sequence[Observation],
         readings: Sequence[Reading],
         stamp_ns: int,
         is_day: IsDay,
@@ -232,10 +231,10 @@ class TagEpisodes:
                     Kind.SCAN_FAILED, Verdict.UNKNOWN, value=float(status), since_ns=stamp_ns
                 )
                 yield _Finding(key, fails, fails, reason)
-        look = next((w for w in reversed(writes) if w.kind == KIND_FLOWER and w.has_seen), None)
-        if look is not None:
-            reason = pest(look.bug_count, stamp_ns)
-            yield _Finding((Kind.PEST, "", ""), look.anomaly, look.anomaly, reason, max)
+        seen = next((w.flower for w in reversed(writes) if w.flower is not None), None)
+        if seen is not None:
+            reason = pest(seen.bug_count, stamp_ns)
+            yield _Finding((Kind.PEST, "", ""), seen.anomaly, seen.anomaly, reason, max)
 
     def _of_range(self, reading: Reading, *, is_day: bool) -> Iterator[_Finding]:
         ranges = self.by.sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
@@ -344,12 +343,8 @@ class TagEpisodes:
         )
 
 
-def readings_of(writes: Sequence[PastWrite]) -> tuple[Reading, ...]:
+def readings_of(writes: Sequence[Observation]) -> tuple[Reading, ...]:
     """The readings of an occasion: for each sensor, the one received last."""
     stamp_ns = writes[0].stamp_ns
-    latest = {
-        name: value
-        for write in writes
-        for name, value in zip(write.sensors, write.values, strict=True)
-    }
+    latest = {name: value for write in writes for name, value in write.values.items()}
     return tuple(Reading(name, value, stamp_ns) for name, value in latest.items())

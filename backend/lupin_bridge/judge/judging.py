@@ -38,8 +38,8 @@ from lupin_bridge.judge.verdict import (
     stopped,
 )
 from lupin_bridge.settings import SettingError, Settings, read_text
-from lupin_twin.core.past import DAY_NS, FOREVER_NS, PastWrite, interval_ns
-from lupin_twin.core.state import Reading, Snapshot, TagState
+from lupin_twin.core.past import DAY_NS, FOREVER_NS, interval_ns
+from lupin_twin.core.state import Observation, Reading, Snapshot, TagState
 
 # More than anybody writes.
 MAX_FILE_BYTES: Final = 1_000_000
@@ -180,7 +180,7 @@ def unjudged(snapshot: Snapshot) -> Judged:
 
 def judge_once(
     snapshot: Snapshot,
-    writes: Iterable[PastWrite],
+    writes: Iterable[Observation],
     criteria: Criteria,
     *,
     days: Mapping[str, Sequence[Reading]] = MappingProxyType({}),
@@ -265,13 +265,13 @@ class Judge:
         self._now_ns = now_ns
         return judged
 
-    def learn(self, writes: Iterable[PastWrite], first: Snapshot | None = None) -> None:
+    def learn(self, writes: Iterable[Observation], first: Snapshot | None = None) -> None:
         """Take what was recent at the first snapshot; `first`: that, if it has not been seen."""
         tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
         self._recent = RecentScans.of(tags, writes, self.criteria.day)
         self._waiting |= dict.fromkeys(self._tags)
 
-    def note_writes(self, writes: Iterable[PastWrite]) -> None:
+    def note_writes(self, writes: Iterable[Observation]) -> None:
         """Take writes of the log, for the next snapshot: no state shows all of them."""
         tags = {tag_id: kept.state for tag_id, kept in self._tags.items()}
         self._waiting |= dict.fromkeys(self._recent.take(writes, tags))
@@ -296,7 +296,7 @@ class Judge:
         if snapshot.tags == self._seen:
             return {}, []
         states: dict[str, TagState] = {}
-        writes: list[PastWrite] = []
+        writes: list[Observation] = []
         for tag in snapshot.tags:
             kept = self._tags.get(tag.tag_id)
             if kept is None:

@@ -19,14 +19,8 @@ from operator import attrgetter, itemgetter
 from typing import Any, Final
 
 from lupin_bridge.judge.day import LIGHT, SINCE_NS, Day, Light, light_after
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
-from lupin_twin.core.past import (
-    SILENCE_NS,
-    SILENT_INTERVALS,
-    PastWrite,
-    usual_ns,
-)
-from lupin_twin.core.state import STATUS_OK, TagState, sure_species
+from lupin_twin.core.past import SILENCE_NS, SILENT_INTERVALS, usual_ns
+from lupin_twin.core.state import KIND_FLOWER, STATUS_OK, Observation, TagState
 
 _S: Final = 1_000_000_000
 SHORTEST_NS: Final = SILENCE_NS
@@ -241,7 +235,7 @@ class RecentScans:
 
     @classmethod
     def of(
-        cls, tags: Sequence[TagState], writes: Iterable[PastWrite], day_of: DayOf
+        cls, tags: Sequence[TagState], writes: Iterable[Observation], day_of: DayOf
     ) -> RecentScans:
         """The recent scans of a state; `writes` is the log of them (see `recent_writes`)."""
         found = cls(day_of)
@@ -270,17 +264,17 @@ class RecentScans:
         """Whether it is day at a moment, by the last scans of all tags."""
         return self._day_of(self._light.is_day, at_ns)
 
-    def take(self, writes: Iterable[PastWrite], tags: Mapping[str, TagState]) -> set[str]:
+    def take(self, writes: Iterable[Observation], tags: Mapping[str, TagState]) -> set[str]:
         """Add writes of `tags`, as these are now; returns those that are judged otherwise."""
         scans: dict[tuple[int, str], dict[str, float]] = {}
         others: set[str] = set()
         for write in writes:
             name = write.tag_id
-            if name in tags and write.has_seen:
-                others |= {name} if self.tag(name).see(write.stamp_ns, write.species) else set()
+            if name in tags and write.flower is not None:
+                is_news = self.tag(name).see(write.stamp_ns, write.flower.sure_species)
+                others |= {name} if is_news else set()
             elif name in tags and write.values:
-                scan = scans.setdefault((write.stamp_ns, name), {})
-                scan.update(zip(write.sensors, write.values, strict=True))
+                scans.setdefault((write.stamp_ns, name), {}).update(write.values)
         late_ns: int | None = None
         for at_ns, group in groupby(sorted(scans), key=itemgetter(0)):
             names = [it for _, it in group if self.tag(it).put(tags[it], at_ns, scans[at_ns, it])]
@@ -325,7 +319,7 @@ class RecentScans:
 _UNKNOWN: Final = TagState("")
 
 
-def writes_of(before: TagState, tag: TagState) -> list[PastWrite]:
+def writes_of(before: TagState, tag: TagState) -> list[Observation]:
     """What happened at a tag between two of its states, oldest first, without run and number.
 
     If there were several attempts, all but the last may be missed. A failed attempt counts as a
@@ -333,27 +327,21 @@ def writes_of(before: TagState, tag: TagState) -> list[PastWrite]:
     """
     # As text, because NaN is not equal to itself.
     known = {repr(reading) for reading in before.readings}
-    scans: dict[int, list[tuple[str, float]]] = {}
+    scans: dict[int, dict[str, float]] = {}
     for reading in tag.readings:
         at_ns = reading.observed_at_ns
         if at_ns is not None and repr(reading) not in known:
-            scans.setdefault(at_ns, []).append((reading.name, reading.value))
-    found = []
-    for at_ns, readings in scans.items():
-        names, values = zip(*readings, strict=True)
-        scan = PastWrite(0, 0, tag.tag_id, at_ns, KIND_TAG_READING, STATUS_OK, names, values)
-        found.append(scan)
+            scans.setdefault(at_ns, {})[reading.name] = reading.value
+    found = [Observation(tag.tag_id, at_ns, values) for at_ns, values in scans.items()]
     looked_ns, flower, last = tag.looked_at_ns, tag.flower, tag.last_try
     if looked_ns is not None and (looked_ns, flower) != (before.looked_at_ns, before.flower):
-        seen = sure_species(flower.species, flower.confidence), flower.anomaly, flower.bug_count
-        look = PastWrite(0, 0, tag.tag_id, looked_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
-        found.append(look)
+        found.append(Observation(tag.tag_id, looked_ns, kind=KIND_FLOWER, flower=flower))
     if last is not None and last.status != STATUS_OK and last != before.last_try:
-        found.append(PastWrite(0, 0, tag.tag_id, last.stamp_ns, KIND_TAG_READING, last.status))
+        found.append(Observation(tag.tag_id, last.stamp_ns, status=last.status))
     return sorted(found, key=_stamp_ns)
 
 
-def recent_writes(at_ns: int, log: Any) -> list[PastWrite]:
+def recent_writes(at_ns: int, log: Any) -> list[Observation]:
     """All that `RecentScans` needs of the log, a `LogReader`, at a moment.
 
     That is what was recent, and what light sensors said before that, by which it is judged.
@@ -362,12 +350,12 @@ def recent_writes(at_ns: int, log: Any) -> list[PastWrite]:
     return [*light_turns(before), *log.recent(at_ns)]
 
 
-def light_turns(scans: Iterable[PastWrite]) -> Iterator[PastWrite]:
+def light_turns(scans: Iterable[Observation]) -> Iterator[Observation]:
     """Yield the scans, oldest first, at which what a tag's light sensor says changes."""
     said: dict[str, tuple[bool | None, int]] = {}
     for scan in scans:
         before, light_ns = said.get(scan.tag_id, (None, 0))
-        light = dict(zip(scan.sensors, scan.values, strict=True)).get(LIGHT)
+        light = scan.values.get(LIGHT)
         said[scan.tag_id] = light_after(before, light_ns, scan.stamp_ns, light)
         if said[scan.tag_id][0] is not before:
             yield scan

@@ -16,7 +16,8 @@ from lupin_bridge.judge.day import LIGHT, Turn, light_after
 from lupin_bridge.judge.episodes import TagEpisodes, readings_of
 from lupin_bridge.judge.quantities import IsDay
 from lupin_bridge.judge.scans import INTERVALS, SHORTEST_NS
-from lupin_twin.core.past import FOREVER_NS, PastWrite
+from lupin_twin.core.past import FOREVER_NS
+from lupin_twin.core.state import Observation
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class Trail:
     light_ns: int = -1
     holds_ns: int = 0
 
-    def after(self, writes: Sequence[PastWrite], holds_ns: HoldsNs, matters: Matters) -> Trail:
+    def after(self, writes: Sequence[Observation], holds_ns: HoldsNs, matters: Matters) -> Trail:
         """The trail with one more occasion."""
         readings = readings_of(writes)
         if not readings:
@@ -84,7 +85,7 @@ class TagStates:
     ) -> None:
         self._holds_ns, self._matters, self._is_day = holds_ns, matters, is_day
         # The writes that are kept, by stamp and number; and the states after all before them.
-        self._log: list[PastWrite] = []
+        self._log: list[Observation] = []
         self._settled_ns = -1
         self._first = Trail(), episodes
         # The states after all writes up to these stamps.
@@ -112,7 +113,7 @@ class TagStates:
             self._episodes_ns = group[0].stamp_ns
         return self._episodes
 
-    def add(self, write: PastWrite) -> bool:
+    def add(self, write: Observation) -> bool:
         """Add a write; False: it is older than what the log keeps."""
         if write.stamp_ns <= self._settled_ns:
             return False
@@ -150,7 +151,7 @@ class TagStates:
             return trail.gaps
         return (*trail.gaps, Gap(trail.scans_ns[-1], None, trail.holds_ns))
 
-    def _occasions(self, after_ns: int, until_ns: int = FOREVER_NS) -> Iterator[list[PastWrite]]:
+    def _occasions(self, after_ns: int, until_ns: int = FOREVER_NS) -> Iterator[list[Observation]]:
         """The writes of each stamp, oldest first."""
         first, end = (bisect_right(self._log, at, key=_stamp_ns) for at in (after_ns, until_ns))
         for _, group in groupby(self._log[first:end], key=_stamp_ns):

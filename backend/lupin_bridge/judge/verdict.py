@@ -15,7 +15,7 @@ from typing import Final
 from lupin_bridge.judge.day import COUNTS_NS
 from lupin_bridge.judge.quantities import DERIVED, Ranges, Sensor, Sensors
 from lupin_bridge.judge.scans import Recent, Scanned
-from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState, sure_species
+from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState
 
 # How long a bad reading counts: one that is no longer valid says nothing about now, but the last
 # news of a tag must not be forgotten if it was alarming.
@@ -140,7 +140,7 @@ def judge_tag(
     if verdict is None:
         verdict = Verdict.HEALTHY if was_judged else Verdict.UNKNOWN
     species = recent.species_at(now_ns)
-    is_shown = species == sure_species(tag.flower.species, tag.flower.confidence)
+    is_shown = species == tag.flower.sure_species
     return Health(verdict, tuple(reasons), "" if is_shown else species)
 
 

@@ -26,7 +26,6 @@ from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.serving.admission import content_answer
 from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.diagnostics import Condition
-from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, withdrawals
 from lupin_twin.core.past import (
     EVERY_TAG,
@@ -34,13 +33,12 @@ from lupin_twin.core.past import (
     RECENT_COUNT,
     Event,
     PastRefused,
-    PastWrite,
     PastWrites,
     RunSpan,
     SeriesRequest,
     silence_ns,
 )
-from lupin_twin.core.state import STATUS_OK
+from lupin_twin.core.state import KIND_FLOWER, STATUS_OK, Observation
 
 # A day at one scan a second has 86,400. Each takes some 25 us, and three times that where alarms
 # are derived; an answer has ten seconds.
@@ -151,7 +149,7 @@ class _Extremes:
     low: tuple[float, str, int] | None = None
     high: tuple[float, str, int] | None = None
 
-    def add(self, value: float, write: PastWrite) -> None:
+    def add(self, value: float, write: Observation) -> None:
         self.n += 1
         self.mean += (value - self.mean) / self.n
         if self.low is None or value < self.low[0]:
@@ -196,7 +194,7 @@ class _Fold:
         cut = [replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns]
         return AlarmFold(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
 
-    def _count(self, write: PastWrite) -> None:
+    def _count(self, write: Observation) -> None:
         if write.status != STATUS_OK:
             self._counts["failed"] += 1
         elif write.kind == KIND_FLOWER:

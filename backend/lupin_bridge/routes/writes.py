@@ -48,7 +48,7 @@ from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import COMMENT, SHELF_S, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
 from lupin_twin.core.past import NotRemembered, PastRefused
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Reading, Scan
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Observation, Pose
 
 log = logging.getLogger(__name__)
 
@@ -311,10 +311,9 @@ async def post_observation(request: Request) -> Response:
         raise TwinUnavailableError("the twin is silent: post it again later")
     stamp_ns = _stamp_ns(draft.observed_at, now_ns)
     pose = None if draft.place is None else Pose.at(*draft.place)
-    readings = tuple(Reading(*each) for each in draft.readings.items())
     source = f"http/{person.name}"
     await bridge.source.publish_observation(
-        Scan(draft.tag_id, stamp_ns, readings, pose, source=source)
+        Observation(draft.tag_id, stamp_ns, draft.readings, pose, source=source)
     )
     body = {"tag_id": draft.tag_id, "observed_at": stamp(stamp_ns), "source": source}
     return json_response(orjson.dumps(body), 202)

@@ -14,22 +14,17 @@ from typing import TYPE_CHECKING, Any, Final
 import orjson
 
 from lupin_bridge.judge.verdict import derive
-from lupin_twin.core.history import (
-    KIND_FLOWER,
-    KIND_TAG_READING,
-    KNOWN_BY_NOTHING,
-    key_of,
-    kind_of,
-)
+from lupin_twin.core.history import KNOWN_BY_NOTHING, key_of
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import (
+    KIND_FLOWER,
+    KIND_TAG_READING,
     NANOSECONDS_PER_SECOND,
     STATUS_OK,
     Attempt,
-    Inspection,
+    Observation,
     Pose,
     Reading,
-    Scan,
     Snapshot,
     TagState,
     age_seconds,
@@ -177,7 +172,7 @@ def header(stamp_ns: int, frame_id: str) -> dict[str, Any]:
 
 
 def history(
-    tag_id: str, writes: Iterable[Scan | Inspection], newest: TagState | None, count: int
+    tag_id: str, writes: Iterable[Observation], newest: TagState | None, count: int
 ) -> dict[str, Any]:
     """`schema.TagHistory`: a tag's last `count` scans with readings, and as many attempts.
 
@@ -191,10 +186,9 @@ def history(
     for number, write in enumerate(writes):
         key: object = number if write.own_stamp_ns == KNOWN_BY_NOTHING else key_of(write)
         stamp_ns = attempts[key][0].stamp_ns if key in attempts else write.stamp_ns
-        attempts[key] = Attempt(stamp_ns, write.status, write.status_detail), kind_of(write)
-        if isinstance(write, Scan) and write.readings:
-            values = scans.setdefault(key, (stamp_ns, {}))[1]
-            values.update((reading.name, reading.value) for reading in write.readings)
+        attempts[key] = Attempt(stamp_ns, write.status, write.status_detail), write.kind
+        if write.values:
+            scans.setdefault(key, (stamp_ns, {}))[1].update(write.values)
         if write.source:
             sources.append((stamp_ns, number, write.source))
     if newest is not None:

@@ -28,10 +28,10 @@ from lupin_patrol.perception import (
     Exploration,
     Grid,
     Plants,
-    readings_at,
     stream,
+    values_at,
 )
-from lupin_twin.core.state import Inspection, Pin, Pose, Reading, Scan, Write
+from lupin_twin.core.state import KIND_FLOWER, Observation, Pin, Pose, Write
 
 
 class ScanStatus(IntEnum):
@@ -74,7 +74,7 @@ class Visited:
     at_s: float
     pass_index: int
     time_of_day_s: float
-    write: Scan | Inspection
+    write: Observation
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,17 +219,17 @@ class Mission:
         self._now_s += _READ_S
         time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
         pose: Pose | None = None
-        readings: tuple[Reading, ...] = ()
+        values: dict[str, float] = {}
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
             pose = pose_of(tag.position, tag.yaw)
-            readings = readings_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
-        scan = Scan(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
+            values = values_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
+        scan = Observation(tag.tag_id, 0, values, pose, status, _DETAILS[status])
         yield Visited(self._now_s, pass_index, time_of_day_s, scan)
         if pose is not None:
             self._now_s += _PICTURE_S
             flower = self._plants.inspect(tag.tag_id, pass_index, attempt)
-            seen = Inspection(tag.tag_id, 0, flower, pose)
+            seen = Observation(tag.tag_id, 0, pose=pose, kind=KIND_FLOWER, flower=flower)
             yield Visited(self._now_s, pass_index, time_of_day_s, seen)
 
     def _drive(self, goal: Point) -> Iterator[Event]:

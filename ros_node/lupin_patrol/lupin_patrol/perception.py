@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Rect, Tag
-from lupin_twin.core.state import Bloom, Flower, Reading
+from lupin_twin.core.state import Bloom, Flower
 
 
 def stream(seed: int, *occasion: str | int) -> random.Random:
@@ -130,17 +130,15 @@ SECONDS_PER_DAY = 86_400.0
 _TO_CONTRACT_UNIT = {"soil_moisture": 100.0}
 
 
-def readings_at(
+def values_at(
     registry: Any, sensors: Sequence[str], position: Point, time_of_day_s: float, chance: Random
-) -> tuple[Reading, ...]:
+) -> dict[str, float]:
     """Read sensors at a place (m, map) and time (s since midnight), noise from `chance` included.
 
     The simulator draws from the global `random`, whose state is therefore replaced.
     """
     random.setstate(chance.getstate())
-    return tuple(
-        Reading(name, value_of(registry, name, position, time_of_day_s)) for name in sensors
-    )
+    return {name: value_of(registry, name, position, time_of_day_s) for name in sensors}
 
 
 def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:

@@ -7,7 +7,7 @@ from lupin_msgs.msg import Observation
 from lupin_patrol.greenhouse import Rect
 from lupin_patrol.mission import ScanStatus, Visited
 from lupin_patrol.node import observation
-from lupin_twin.core.state import Scan
+from lupin_twin.core import state
 
 
 def test_a_rectangle_does_not_contain_its_edge() -> None:
@@ -17,7 +17,7 @@ def test_a_rectangle_does_not_contain_its_edge() -> None:
 
 
 def test_a_failed_scan_is_an_observation_without_readings() -> None:
-    scan = Scan("7", 0, status=ScanStatus.UNREACHABLE, status_detail="blocked")
+    scan = state.Observation("7", 0, status=ScanStatus.UNREACHABLE, status_detail="blocked")
     message = observation(Visited(3.0, 0, 0.0, scan), 12_000_000_000, "map")
     assert (message.kind, message.status) == (
         Observation.KIND_TAG_READING,

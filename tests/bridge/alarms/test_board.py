@@ -32,10 +32,11 @@ from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, WITHDRAW, Note
-from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest
-from lupin_twin.core.state import Flower, Inspection, Reading, Scan, Snapshot, TwinStore
+from lupin_twin.core.past import PastWrites, RunSpan, WritesRequest
+from lupin_twin.core.state import Flower, Observation, Snapshot, TwinStore
 from lupin_twin.runtime.workers import Workers
 from tests.support.seen import Alarms, alarm
+from tests.support.store import logged
 from tests.support.waiting import until
 
 A, B = alarm("a"), alarm("b", raised_ns=2)
@@ -188,7 +189,7 @@ class Journal:
 
     def __init__(self) -> None:
         self.workers = Workers("test")
-        self.writes_now: list[PastWrite] = []
+        self.writes_now: list[Observation] = []
         self.name, self.requested = "a", 0
         self.is_removed = False
         self.fault: Exception | None = None
@@ -212,22 +213,21 @@ class Journal:
         return PastWrites(self.name, (span,), part, last, len(part) == len(found))
 
 
-def pest(number: int, bugs: int) -> PastWrite:
-    seen = (True, "", bugs > 0, bugs)
-    return PastWrite(number, 1, "a", NOW - 100 + number, 1, 0, (), (), *seen)
+def pest(number: int, bugs: int) -> Observation:
+    seen = Flower(anomaly=bugs > 0, bug_count=bugs)
+    return logged(number, 1, "a", NOW - 100 + number, 1, 0, flower=seen)
 
 
 def reported(number: int, **over: object) -> TwinUpdate:
     store = TwinStore()
-    store.record_inspection(
-        Inspection("a", NOW - 100 + number, Flower(bug_count=number, anomaly=True))
-    )
+    seen = Flower(bug_count=number, anomaly=True)
+    store.record(Observation("a", NOW - 100 + number, kind=1, flower=seen))
     snapshot: Snapshot = store.snapshot(NOW + number, "map")
     return TwinUpdate(snapshot, str(number), **over)  # type: ignore[arg-type]
 
 
 @asynccontextmanager
-async def following(*writes: PastWrite) -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
+async def following(*writes: Observation) -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
     """With writes: once the board has what the log has."""
     source, board = Journal(), AlarmBoard()
     source.writes_now = list(writes)
@@ -254,10 +254,10 @@ async def test_a_late_scan_which_no_state_shows_counts_for_the_status() -> None:
     """The tag's readings are then valid for three times ten minutes, not for a day."""
     async with following(pest(1, 1)) as (feed, _, source):
         store, judge = TwinStore(), feed.judge
-        store.record(Scan("a", NOW, (Reading("temperature", 22.0),)))
+        store.record(Observation("a", NOW, {"temperature": 22.0}))
         judge.see(store.snapshot(NOW, "map"))
         assert judge.holds_ns() == {"a": 86_400 * 10**9}
-        late = PastWrite(2, 1, "a", NOW - 600 * 10**9, 0, 0, ("temperature",), (22.0,))
+        late = logged(2, 1, "a", NOW - 600 * 10**9, 0, 0, ("temperature",), (22.0,))
         source.writes_now += [late, replace(late, number=3, run=0, stamp_ns=NOW - 10**9)]
         source.written = 2
         feed.on_state(reported(1))
@@ -405,12 +405,9 @@ async def test_a_state_from_before_a_silence_does_not_withdraw_it() -> None:
         assert (over.reason.kind, over.cleared_at_ns) == ("silent", NOW)
 
 
-def after(store: TwinStore, *writes: Scan | Inspection) -> Snapshot:
+def after(store: TwinStore, *writes: Observation) -> Snapshot:
     for write in writes:
-        if isinstance(write, Scan):
-            store.record(write)
-        else:
-            store.record_inspection(write)
+        store.record(write)
     return store.snapshot(NOW, "map")
 
 
@@ -419,9 +416,9 @@ def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> Non
     pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
     first = after(
         store,
-        Scan("a", 5, (Reading("co2", 400.0), Reading("light", 1.0))),
-        Inspection("a", 4, pest),
-        Scan("b", 6, (), status=2),
+        Observation("a", 5, {"co2": 400.0, "light": 1.0}),
+        Observation("a", 4, kind=1, flower=pest),
+        Observation("b", 6, status=2),
     )
     reported = writes_between(None, first, 7)
     assert [(w.number, w.tag_id, w.stamp_ns, w.kind, w.status) for w in reported] == [
@@ -429,9 +426,9 @@ def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> Non
         (8, "a", 5, 0, 0),
         (9, "b", 6, 0, 2),
     ]
-    assert (reported[0].species, reported[0].anomaly, reported[0].bug_count) == ("tulip", True, 3)
-    assert (reported[1].sensors, reported[1].values) == (("co2", "light"), (400.0, 1.0))
-    second = after(store, Scan("a", 9, (Reading("co2", 410.0),)))
+    assert reported[0].flower == pest
+    assert reported[1].values == {"co2": 400.0, "light": 1.0}
+    second = after(store, Observation("a", 9, {"co2": 410.0}))
     (new,) = writes_between(first, second, 10)
-    assert (new.stamp_ns, new.sensors, new.values) == (9, ("co2",), (410.0,))
+    assert (new.stamp_ns, new.values) == (9, {"co2": 410.0})
     assert writes_between(second, replace(second, stamp_ns=NOW + 1), 11) == []

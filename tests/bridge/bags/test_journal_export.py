@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 import yaml
-from lupin_msgs.msg import DiscoveredTags, Observation
+from lupin_msgs.msg import DiscoveredTags
+from lupin_msgs.msg import Observation as ObservationMsg
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -17,7 +18,7 @@ from lupin_bridge.bags.journal_export import export
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.state import Inspection, Pin, Pose, TagState, TwinStore, Write
+from lupin_twin.core.state import Observation, Pin, Pose, TagState, TwinStore, Write
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
@@ -26,8 +27,8 @@ from tests.support.bags import is_open, no_file_above, read
 from tests.support.journal import NOW, SECOND, append, inspection, opened, pin, scan
 from tests.support.processes import run_here
 
-FAILED_INSPECTION = Inspection(
-    "7", NOW, None, status=2, status_detail="dark", source="robot", mission="m1"
+FAILED_INSPECTION = Observation(
+    "7", NOW, status=2, status_detail="dark", source="robot", mission="m1", kind=1
 )
 ROWS: list[Write] = [
     pin("7"),
@@ -38,7 +39,7 @@ ROWS: list[Write] = [
     replace(FAILED_INSPECTION, arrival_ns=NOW + 2000),
     # Late, and from a robot whose clock is ahead: such a clock does not count.
     replace(scan("8", NOW + SECOND), own_stamp_ns=NOW * 3),
-    replace(scan("8", NOW + 3 * SECOND), readings=(), status=1, status_detail="no way"),
+    replace(scan("8", NOW + 3 * SECOND), values={}, status=1, status_detail="no way"),
     inspection("7", NOW + 4 * SECOND),
     replace(pin("9", NOW + 5 * SECOND), pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 1e-9)),
     *(scan("7", NOW + 6 * SECOND + n, temperature=float(n)) for n in range(9)),
@@ -69,8 +70,8 @@ def fed(target: Path) -> tuple[dict[str, str], list[str]]:
     store, repeats, written = TwinStore(), Repeats(), list[str]()
     for topic, log_ns, _, data in read(target):
         if topic == "/floranova/observations":
-            msg = deserialize_message(data, Observation)
-            write = ingest.observation(convert.received(msg), "map", log_ns)
+            msg = deserialize_message(data, ObservationMsg)
+            write = ingest.observation(*convert.received(msg), "map", log_ns)
             assert not isinstance(write, Drop)
             assert ingest.apply(write, store, repeats) is None
             written.append(repr(write))

@@ -25,7 +25,6 @@ from lupin_bridge.serving.admission import Limits
 from lupin_twin.core.diagnostics import STATE_TOPIC, Condition, Finding, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.core.state import Reading, Scan
 from lupin_twin.journal.follow import Lot, followed, write
 from lupin_twin.ros.convert import diagnostics
 from lupin_twin.runtime.workers import Workers
@@ -120,7 +119,7 @@ async def test_after_a_silence_a_new_node_recovers_everything(
                 peer.publish("/twin/state", state_of(value), depth=1)
                 await until(lambda: received() == relayed() == value, "the state, raw too")
                 await until_answered(place, "the robot", lambda x: x == value)
-                scan = Scan("1", 1, (Reading("co2", value),), source="program")
+                scan = Observation("1", 1, {"co2": value}, source="program")
                 await twin.publish_observation(scan)
                 await asyncio.to_thread(
                     peer.until,

@@ -16,7 +16,7 @@ from pyarrow import parquet
 
 from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.fleet.watcher import MAX_ALARMS
-from lupin_twin.core.state import Scan, Write
+from lupin_twin.core.state import Observation, Write
 from tests.support.archive import Archive
 from tests.support.fleet import Page, fleet, forward, recent_scans, wall
 from tests.support.journal import SECOND, inspection, scan
@@ -287,7 +287,7 @@ def rows_of(begun_s: int) -> list[Write]:
             found.append(scan("b", at_ns + SECOND, temperature=21.0))
     found.append(inspection("b", (begun_s + 300) * SECOND, anomaly=True))
     failed = (begun_s + 400) * SECOND
-    found.append(Scan("b", failed, (), None, 2, "no", "robot", arrival_ns=failed + 1000))
+    found.append(Observation("b", failed, {}, None, 2, "no", "robot", arrival_ns=failed + 1000))
     return sorted(found, key=lambda row: row.stamp_ns)
 
 

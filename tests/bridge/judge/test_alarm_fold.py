@@ -16,10 +16,11 @@ from lupin_bridge.judge.alarm_fold import AlarmFold, AlarmLog
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
-from lupin_twin.core.past import PastWrite, PastWrites, RunSpan
-from lupin_twin.core.state import TagState
+from lupin_twin.core.past import PastWrites, RunSpan
+from lupin_twin.core.state import Flower, Observation, TagState
 from tests.support.alarms_reference import Plain, S, alarms
 from tests.support.climate import DAY_NS, ordinary_days
+from tests.support.store import logged
 
 SENSORS = own_sensors()
 FOREVER = 2**63 - 1
@@ -57,8 +58,8 @@ SPANS = [
 ]
 
 
-def some_write(chance: random.Random, number: int) -> PastWrite:
-    one = PastWrite(
+def some_write(chance: random.Random, number: int) -> Observation:
+    one = Observation(
         number=number,
         run=chance.choice([1, 1, 1, 2]),
         tag_id=chance.choice("abc"),
@@ -67,15 +68,12 @@ def some_write(chance: random.Random, number: int) -> PastWrite:
         status=chance.choice([0, 0, 0, 2]),
     )
     if one.kind == SCAN:
-        names = tuple(chance.sample(sorted(VALUES), chance.randint(0, 4)))
-        values = tuple(chance.choice(VALUES[name]) for name in names)
-        return replace(one, sensors=names, values=values)
+        names = chance.sample(sorted(VALUES), chance.randint(0, 4))
+        return replace(one, values={name: chance.choice(VALUES[name]) for name in names})
     if one.status:
         return one
     species, bugs = chance.choice(["", "Orchid", "tulip"]), chance.randint(0, 3)
-    return replace(
-        one, has_seen=True, species=species, anomaly=chance.random() < 0.5, bug_count=bugs
-    )
+    return replace(one, flower=Flower(species, 1.0, chance.random() < 0.5, bug_count=bugs))
 
 
 def plain(alarm: Alarm) -> Plain:
@@ -96,7 +94,7 @@ def plain(alarm: Alarm) -> Plain:
 
 
 def follow(
-    lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
+    lots: Iterable[Sequence[Observation]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
     """As a bridge does that is queried now and then."""
     fold = AlarmFold(BY, spans)
@@ -196,7 +194,7 @@ def test_memory_does_not_grow_with_the_days() -> None:
         for at in (0, 1):
             light, number = (900.0, 0.0)[at], 2 * day + at
             stamp_ns = START + day * DAY_NS + at * MINUTE
-            fold.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
+            fold.take([logged(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
         fold.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
         if day % 40 == 39:
             sizes.append(held(fold))
@@ -215,7 +213,7 @@ def test_ordered_writes_are_judged_once_and_a_late_one_has_its_tag_judged_again(
 
     def count(number: int, at_ns: int) -> int:
         judged.clear()
-        fold.take([PastWrite(number, 1, "a", at_ns, SCAN, 0, ("co2",), (400.0,))])
+        fold.take([logged(number, 1, "a", at_ns, SCAN, 0, ("co2",), (400.0,))])
         fold.found(at_ns)
         return len(judged)
 
@@ -223,15 +221,17 @@ def test_ordered_writes_are_judged_once_and_a_late_one_has_its_tag_judged_again(
     assert count(9_998, START + 1) == 101
 
 
-def scans(values: Sequence[float], sensor: str = "temperature", tag: str = "a") -> list[PastWrite]:
+def scans(
+    values: Sequence[float], sensor: str = "temperature", tag: str = "a"
+) -> list[Observation]:
     """By day, one a minute."""
     return [
-        PastWrite(number, 1, tag, START + number * MINUTE, SCAN, 0, ("light", sensor), (900, value))
+        logged(number, 1, tag, START + number * MINUTE, SCAN, 0, ("light", sensor), (900, value))
         for number, value in enumerate(values)
     ]
 
 
-def reported(received: Sequence[PastWrite], later_ns: int = 0) -> list[Alarm]:
+def reported(received: Sequence[Observation], later_ns: int = 0) -> list[Alarm]:
     return list(follow([received], SPANS[0], received[-1].stamp_ns + later_ns))
 
 
@@ -267,9 +267,7 @@ def test_unchanged_alarms_are_the_same_objects_and_the_next_change_is_reported()
     fold.take(received[2:])
     assert [one.worst for one in fold.found(now_ns).alarms] == [16]
     # It was warm between the two.
-    late = [
-        replace(received[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)
-    ]
+    late = [replace(scans([22.0])[0], number=90 + n, stamp_ns=START + n) for n in (1, 2)]
     fold.take(late)
     assert first[0].id not in {one.id for one in fold.found(now_ns).alarms}
     fold = AlarmFold(BY, SPANS[0])
@@ -306,9 +304,9 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     # Pests are real: from the first inspection that saw one to the second that did not.
     clean: dict[str, int] = {}
     broke_out = 0
-    for inspection in (write for write in received if write.has_seen):
-        broke_out += inspection.anomaly and clean.get(inspection.tag_id, 2) >= 2
-        clean[inspection.tag_id] = 0 if inspection.anomaly else clean.get(inspection.tag_id, 2) + 1
+    for tag_id, seen in ((write.tag_id, write.flower) for write in received if write.flower):
+        broke_out += seen.anomaly and clean.get(tag_id, 2) >= 2
+        clean[tag_id] = 0 if seen.anomaly else clean.get(tag_id, 2) + 1
     assert counts["pest", ""] == broke_out
     # Attempts that failed twice in one round are not reported; failures in two rounds are.
     for lost in (one for one in raised if one.reason.kind == "scan_failed"):
@@ -340,11 +338,11 @@ def test_an_alarm_older_than_what_is_read_at_first_keeps_its_id() -> None:
     assert passes == 3
 
 
-def of_day(day: int, at_ns: int) -> list[PastWrite]:
+def of_day(day: int, at_ns: int) -> list[Observation]:
     found = [
-        PastWrite(0, 1, tag_id, at_ns, SCAN, 0, ("temperature",), (value,))
+        logged(0, 1, tag_id, at_ns, SCAN, 0, ("temperature",), (value,))
         for tag_id, value in (("a", 40.0 if day >= 20 else 22.0), ("c", 22.0))
     ]
     if day == 30:
-        found.append(PastWrite(0, 1, "b", at_ns, LOOK, 0, (), (), True, "", True, 3))
+        found.append(logged(0, 1, "b", at_ns, LOOK, 0, flower=Flower(anomaly=True, bug_count=3)))
     return found

@@ -14,8 +14,9 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.judge.verdict import Verdict
-from lupin_twin.core.past import DAY_NS, PastWrite, RunSpan
-from lupin_twin.core.state import Reading
+from lupin_twin.core.past import DAY_NS, RunSpan
+from lupin_twin.core.state import Flower, Observation, Reading
+from tests.support.store import logged
 
 HOUR = 3600 * 10**9
 SPANS = (RunSpan(1, 0, 2**63 - 1),)
@@ -37,11 +38,11 @@ class DawnToDusk(Criteria):
 
 def scans(
     of: dict[str, list[float]], every_h: float = 1.0, first_h: float = DAWN
-) -> list[PastWrite]:
+) -> list[Observation]:
     """A sensor's value on each day, from dawn to dawn, read again and again."""
     numbers = count(1)
     return [
-        PastWrite(next(numbers), 1, "a", at_ns, 0, 0, (name,), (value,))
+        logged(next(numbers), 1, "a", at_ns, 0, 0, (name,), (value,))
         for name, values in of.items()
         for day, value in enumerate(values)
         for step in range(round(24 / every_h))
@@ -57,7 +58,7 @@ def new_fold() -> AlarmFold:
     return AlarmFold(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
 
 
-def found(received: Iterable[PastWrite]) -> list[Alarm]:
+def found(received: Iterable[Observation]) -> list[Alarm]:
     fold = new_fold()
     fold.take(received)
     alarms = [one for one in fold.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
@@ -81,7 +82,7 @@ def test_a_days_mean_raises_at_the_next_dawn_and_has_no_deadband() -> None:
     reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
     assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
     own = [
-        replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
+        replace(one, values={"temperature": 14.0, MEAN: 20.0})
         for one in scans({"temperature": [14.0] * 3})
     ]
     assert found(own) == []
@@ -90,10 +91,10 @@ def test_a_days_mean_raises_at_the_next_dawn_and_has_no_deadband() -> None:
 def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
     chance = random.Random(4)
     received = [
-        replace(one, values=(chance.uniform(5.0, 14.0),))
+        replace(one, values={"temperature": chance.uniform(5.0, 14.0)})
         for one in scans({"temperature": [0.0] * 3}, every_h=0.2)
     ]
-    readings = [(one.stamp_ns, one.values[0]) for one in received]
+    readings = [(one.stamp_ns, one.values["temperature"]) for one in received]
     alarms = found(received)
     assert {one.reason.sensor for one in alarms} == {MEAN, MINIMUM}
     for alarm in alarms:
@@ -131,7 +132,7 @@ def test_a_late_scan_corrects_its_day() -> None:
 def test_a_range_of_light_belongs_to_a_crop_and_without_a_clock_a_day_is_24_hours() -> None:
     received = scans({"light": [4_000.0, 4_000.0]})
     assert found(received) == []
-    inspection = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
+    inspection = logged(10_000, 1, "a", HOUR, 1, 0, flower=Flower("Lettuce", 1.0))
     [dim] = found([inspection, *received])
     assert dim.reason.sensor == "daily_light_integral"
     assert dim.reason.value == pytest.approx(24 * 3600 * 4_000.0 / 54.0 / 1e6)
@@ -148,7 +149,7 @@ def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives
     # Some days lack their last hours and much of the next day.
     gaps = [(dawn(day) + 20 * HOUR, dawn(day) + 44 * HOUR) for day in range(seed % 3, 7, 3)]
     received = [
-        replace(one, values=(chance.choice([*3 * [5.0, 14.0, 20.0], math.nan, 1e9]),))
+        replace(one, values={"temperature": chance.choice([*3 * [5.0, 14.0, 20.0], math.nan, 1e9])})
         for one in scans({"temperature": [0.0] * 7}, every_h=chance.choice([0.5, 1.0]))
         if not any(start < one.stamp_ns < end for start, end in gaps)
     ]

@@ -22,18 +22,10 @@ from lupin_bridge.judge.scans import (
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
 from lupin_bridge.stream.state_json import judgement
-from lupin_twin.core.past import PastWrite, recent_of
-from lupin_twin.core.state import (
-    Flower,
-    Inspection,
-    Reading,
-    Scan,
-    Snapshot,
-    TagState,
-    TwinStore,
-    sure_species,
-)
+from lupin_twin.core.past import recent_of
+from lupin_twin.core.state import Flower, Observation, Reading, Snapshot, TagState, TwinStore
 from tests.support.seen import BY_LIGHT, tag
+from tests.support.store import logged
 
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
 S = 1_000_000_000
@@ -140,9 +132,8 @@ def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_sca
     assert [it.verdict for it in forgotten] == [stressed] * 9 + [Verdict.HEALTHY]
 
 
-def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
-    names, numbers = tuple(values), tuple(values.values())
-    return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
+def scan(tag_id: str, at_ns: int, **values: float) -> Observation:
+    return Observation(tag_id, at_ns, values, number=at_ns, run=1)
 
 
 def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() -> None:
@@ -235,24 +226,22 @@ def test_incremental_judging_equals_judging_the_whole_log(
     events: list[tuple[str, dict[str, float], Flower | None, int, int]],
 ) -> None:
     """Live, as of a moment, and after a restart: the same, also with what came late."""
-    judge, store, log = Judge(BY_LIGHT), TwinStore(), list[PastWrite]()
+    judge, store, log = Judge(BY_LIGHT), TwinStore(), list[Observation]()
     now_ns = START
     for number, (tag_id, values, flower, step_s, late_s) in enumerate(events):
         now_ns += step_s * S
         at_ns = now_ns - late_s * S
         if flower is not None:
-            store.record_inspection(Inspection(tag_id, at_ns, flower))
-            species = sure_species(flower.species, flower.confidence)
-            log.append(PastWrite(number, 1, tag_id, at_ns, 1, 0, (), (), True, species))
+            log.append(logged(number, 1, tag_id, at_ns, 1, 0, flower=flower))
+            store.record(log[-1])
         elif values:
-            readings = tuple(Reading(*each) for each in values.items())
-            store.record(Scan(tag_id, at_ns, readings))
             log.append(replace(scan(tag_id, at_ns, **values), number=number))
+            store.record(log[-1])
         then = store.snapshot(now_ns, "map")
         judge.see(then)
         judge.note_writes(log[-1:])
         in_time = sorted(log, key=lambda write: (write.stamp_ns, write.number))
-        scans = [write for write in in_time if not write.has_seen]
+        scans = [write for write in in_time if write.flower is None]
         live, recent = judge.see(then), [*light_turns(scans), *recent_of(log, now_ns)]
         past = judge_once(then, recent, BY_LIGHT)
         started = Judge(BY_LIGHT)
@@ -356,7 +345,7 @@ def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
     assert reasons(again_ns + 60 * MINUTE, *later, greenhouse[2]) == (Verdict.HEALTHY, [])
 
 
-def writes_of(*tags: TagState) -> list[PastWrite]:
+def writes_of(*tags: TagState) -> list[Observation]:
     """The scans of these states, as they are in the log."""
     return [
         scan(one.tag_id, one.last_observed_ns or 0, **{it.name: it.value for it in one.readings})
@@ -372,7 +361,7 @@ def scanned(*stamps_s: float, tags: int = 10) -> RecentScans:
     scans = RecentScans(BY_LIGHT.day)
     for number, stamp_s in enumerate(stamps_s):
         name = str(number % tags)
-        write = PastWrite(0, 0, name, int(stamp_s * S), 0, 0, ("temperature",), (22.0,))
+        write = logged(0, 0, name, int(stamp_s * S), 0, 0, ("temperature",), (22.0,))
         scans.take([write], {name: TagState(name)})
     return scans
 

@@ -11,7 +11,7 @@ from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import Language, Ranges, Span
 from lupin_bridge.judge.sensors_file import MAX_TEXT, SensorsError, parse
-from lupin_twin.core.past import PastWrite
+from tests.support.store import logged
 
 OURS = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
 GOOD: dict[str, Any] = {
@@ -156,7 +156,7 @@ def test_the_widest_and_the_narrowest_ranges_are_accepted(ideal: list[float]) ->
     by = Criteria(sensors, None, ClockDay(None))
     episodes = TagEpisodes("a", 0, by, TagDays(sensors, lambda _: True, int))
     for at, value in enumerate([-1e300, -1e300, 0.0, 1e308, 1e308, ideal[0], ideal[1], 0.0]):
-        scan = PastWrite(at, 1, "a", at, 0, 0, ("temperature",), (value,))
+        scan = logged(at, 1, "a", at, 0, 0, ("temperature",), (value,))
         episodes.step([scan], lambda _: True)
     assert {alarm.worst for alarm in episodes.alarms()} == {-1e300, 1e308}
 

@@ -10,8 +10,8 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime, time
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +25,13 @@ from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.judging import Criteria, Judge, Judged, own_sensors, silenced
 from lupin_bridge.judge.scans import RecentScans
 from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_site, judge_tag
-from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import (
     NO_FLOWER,
     Attempt,
     Flower,
-    Inspection,
+    Observation,
     Pose,
     Reading,
-    Scan,
     TagState,
     TwinStore,
 )
@@ -153,7 +151,7 @@ S = 1_000_000_000
 EVERY_S, ROUNDS = 120, 5
 SCAN, LOOK = 0, 1
 
-Write = tuple[int, str, Scan | Inspection]
+Write = tuple[int, str, Observation]
 
 
 def now_ns(state: dict[str, Any]) -> int:
@@ -182,45 +180,25 @@ def writes_of(state: dict[str, Any]) -> list[Write]:
 def of_tag(state: dict[str, Any], tag_id: str, tag: dict[str, Any]) -> Iterator[Write]:
     now, every_s = now_ns(state), state.get("every_s", EVERY_S)
     rounds, was = state.get("rounds", ROUNDS), tag.get("was", {})
-    scans: dict[int, list[Reading]] = {}
+    scans: dict[int, dict[str, float]] = {}
     for name, (value, age_s) in tag["readings"].items():
         for back in range(rounds):
             found = was.get(name, value) if back else value
             at_ns = now - (age_s + back * every_s) * S
-            reading = Reading(name, math.nan if found is None else found)
-            scans.setdefault(at_ns, []).append(reading)
-    for at_ns, readings in scans.items():
-        yield at_ns, tag_id, Scan(tag_id, at_ns, tuple(readings))
+            scans.setdefault(at_ns, {})[name] = math.nan if found is None else found
+    for at_ns, values in scans.items():
+        yield at_ns, tag_id, Observation(tag_id, at_ns, values)
     for status, age_s in tag.get("failed", ()):
         at_ns = now - age_s * S
-        yield at_ns, tag_id, Scan(tag_id, at_ns, (), status=status)
+        yield at_ns, tag_id, Observation(tag_id, at_ns, status=status)
     if "species" in tag or "pest" in tag:
         at_ns, bugs = now - tag.get("looked_s", 90) * S, tag.get("pest", 0)
         flower = Flower(tag.get("species", ""), 0.9, anomaly=bugs > 0, bug_count=bugs)
-        yield at_ns, tag_id, Inspection(tag_id, at_ns, flower)
+        yield at_ns, tag_id, Observation(tag_id, at_ns, kind=LOOK, flower=flower)
 
 
-def journal_rows(writes: list[Write]) -> list[PastWrite]:
-    return [
-        PastWrite(
-            number,
-            1,
-            tag_id,
-            at_ns,
-            SCAN,
-            write.status,
-            tuple(reading.name for reading in write.readings),
-            tuple(reading.value for reading in write.readings),
-        )
-        if isinstance(write, Scan)
-        else PastWrite(number, 1, tag_id, at_ns, LOOK, 0, (), (), *seen(write))
-        for number, (at_ns, tag_id, write) in zip(count(1), writes, strict=False)
-    ]
-
-
-def seen(inspection: Inspection) -> tuple[bool, str, bool, int]:
-    assert inspection.flower is not None
-    return True, inspection.flower.species, inspection.flower.anomaly, inspection.flower.bug_count
+def journal_rows(writes: list[Write]) -> list[Observation]:
+    return [replace(write, number=number, run=1) for number, (_, _, write) in enumerate(writes, 1)]
 
 
 def criteria() -> Criteria:
@@ -230,10 +208,7 @@ def criteria() -> Criteria:
 def judged(state: dict[str, Any]) -> Judged:
     store, judge = TwinStore(), Judge(criteria())
     for at_ns, _, write in writes_of(state):
-        if isinstance(write, Scan):
-            store.record(write)
-        else:
-            store.record_inspection(write)
+        store.record(write)
         judge.see(store.snapshot(at_ns, "map"))
     for tag_id, tag in tags_of(state).items():
         if not tag["readings"]:

@@ -38,7 +38,6 @@ from lupin_twin.core.past import (
     MAX_POINTS,
     MAX_READINGS,
     PastRefused,
-    PastWrite,
     SeriesPast,
     SeriesRequest,
     grid,
@@ -50,6 +49,7 @@ from lupin_twin.field.idw import never
 from lupin_twin.journal.counts import Buckets, individually
 from lupin_twin.runtime.workers import SMALL_S
 from tests.support.past import MadeUp
+from tests.support.store import logged
 
 NS = 10**9
 SENSORS = own_sensors()
@@ -140,7 +140,7 @@ def judged_at(at_s: float, *tags: TagState, before_s: Sequence[float] = ()) -> P
     """Where tag a was also scanned some seconds before its own second."""
     at_ns = int(at_s * NS)
     recent = tuple(
-        PastWrite(number, 1, "a", int((1 - second) * NS), 0, 0, ("temperature",), (22.0,))
+        logged(number, 1, "a", int((1 - second) * NS), 0, 0, ("temperature",), (22.0,))
         for number, second in enumerate(before_s)
     )
     log = log_of(Snapshot(at_ns, "map", tags), scanned=recent)

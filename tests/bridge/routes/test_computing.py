@@ -22,7 +22,7 @@ from lupin_bridge.serving.connections import HttpConnection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.notes import Note, withdrawals
-from lupin_twin.core.state import Pose, Reading, Scan
+from lupin_twin.core.state import Observation, Pose
 from lupin_twin.field.engine import FieldRequest, compute_field
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
@@ -65,8 +65,8 @@ async def greenhouse(limits: Limits = EAGER) -> AsyncIterator[Running]:
             for number in range(20):
                 pose = Pose(2.0 + number / 100, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
                 names = ("co2", *(f"co2 {n}" for n in range(60)))
-                readings = tuple(Reading(name, 400.0) for name in names)
-                node.store.record(Scan(str(number), 1_000_000_000, readings, pose))
+                values = dict.fromkeys(names, 400.0)
+                node.store.record(Observation(str(number), 1_000_000_000, values, pose))
 
         await it.in_ros_thread(fill)
         await until(
@@ -250,7 +250,7 @@ async def test_the_state_is_serialised_a_few_times_a_second_and_is_never_old(
         # Plus the frames' own writes of each state.
         assert len(written) <= most + states
         pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-        new = Scan("new", 1, (), pose)
+        new = Observation("new", 1, {}, pose)
 
         await it.in_ros_thread(lambda node: node.store.record(new))
         await until(lambda: len(it.bridge.latest.snapshot.tags) == 21, "the new tag")  # type: ignore[union-attr]

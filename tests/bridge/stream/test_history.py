@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lupin_bridge.stream.state_json import history, stamp
 from lupin_twin.core import ingest
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.state import Inspection, Reading, Scan, TwinStore
+from lupin_twin.core.state import Observation, TwinStore
 from tests.support.store import S, inspection, scan
 
 WRITES = st.lists(
@@ -27,15 +27,14 @@ WRITES = st.lists(
 
 
 @given(WRITES, st.integers(1, 6))
-def test_the_history_equals_the_simplest_one(writes: list[Scan | Inspection], count: int) -> None:
+def test_the_history_equals_the_simplest_one(writes: list[Observation], count: int) -> None:
     """All observations, sorted by stamp, each once, and of these the latest."""
     scans: dict[tuple[int, str], dict[str, float]] = {}
     keys: dict[tuple[int, int, str], None] = {}
     for write in writes:
-        keys.setdefault((write.stamp_ns, isinstance(write, Inspection), write.source))
-        if isinstance(write, Scan) and write.readings:
-            readings = {r.name: r.value for r in write.readings}
-            scans.setdefault((write.stamp_ns, write.source), {}).update(readings)
+        keys.setdefault((write.stamp_ns, write.kind, write.source))
+        if write.values:
+            scans.setdefault((write.stamp_ns, write.source), {}).update(write.values)
     past = history("1", writes, None, count)
     latest = sorted(keys, key=lambda key: key[0])[-count:]
     assert [(it["stamp"], it["kind"]) for it in past["tries"]] == [
@@ -60,12 +59,12 @@ def test_with_a_log_that_lacks_the_last_write_nothing_is_missing(
     steps: list[tuple[int, set[str], bool]],
 ) -> None:
     """The latest state contains it."""
-    store, repeats, every = TwinStore(), Repeats(), list[Scan | Inspection]()
+    store, repeats, every = TwinStore(), Repeats(), list[Observation]()
     at_s = 0
     for number, (wait_s, sensors, is_inspection) in enumerate(steps, 1):
         at_s += wait_s
-        readings = tuple(Reading(name, float(number)) for name in sorted(sensors))
-        every.append(inspection("1", at_s) if is_inspection else Scan("1", at_s * S, readings))
+        values = dict.fromkeys(sorted(sensors), float(number))
+        every.append(inspection("1", at_s) if is_inspection else Observation("1", at_s * S, values))
         assert ingest.apply(every[-1], store, repeats) is None
     for tag in store.snapshot(0, "map").tags:
         found, expected = history("1", every[:-1], tag, 32), history("1", every, None, 32)

@@ -11,7 +11,7 @@ from lupin_twin.adapt.config import Config, Robot
 from lupin_twin.adapt.scans import FIXED_SOURCE, SCAN_FAILED, VISIT_SOURCE, Scans
 from lupin_twin.adapt.table import number_of
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, Rejected
-from lupin_twin.core.state import Pose, Reading, Scan
+from lupin_twin.core.state import Observation, Pose
 
 S = 1_000_000_000
 ROBOT = Robot("/pose", "geometry_msgs/msg/PoseStamped", max_age_s=30.0)
@@ -27,7 +27,7 @@ def read(scans: Scans, at_s: float, value: float = 20.0) -> bool:
     return scans.take("temperature", "", value, int(at_s * S), int(at_s * S))
 
 
-def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[Scan]:
+def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[Observation]:
     return list(scans.move(x, y, int(at_s * S)))
 
 
@@ -37,10 +37,10 @@ def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
     assert read(scans, 3, 20.0)
     assert read(scans, 2, 22.0)  # the scan has the latest stamp, whatever arrived last
     (scan,) = move(scans, 4, 1.5)
-    assert scan == Scan(
+    assert scan == Observation(
         "A",
         3 * S,
-        (Reading("temperature", 21.0),),
+        {"temperature": 21.0},
         TAGS["A"],
         status_detail="temperature ±1.4 of 2",
         source=VISIT_SOURCE,
@@ -56,7 +56,7 @@ def test_a_long_stop_is_one_scan_per_window() -> None:
     assert [scan.stamp_ns for scan in scans.due(10 * S)] == [S]
     read(scans, 11, 30.0)
     (scan,) = move(scans, 12, 9.0)
-    assert scan.readings == (Reading("temperature", 30.0),)
+    assert scan.values == {"temperature": 30.0}
 
 
 def test_a_stop_without_readings_is_a_failed_scan_and_passing_by_is_none() -> None:
@@ -65,7 +65,7 @@ def test_a_stop_without_readings_is_a_failed_scan_and_passing_by_is_none() -> No
     assert move(scans, 1, 1.5) == []
     move(scans, 2, 0.0)
     (scan,) = move(scans, 5, 1.5)
-    assert (scan.tag_id, scan.readings, scan.status) == ("A", (), SCAN_FAILED)
+    assert (scan.tag_id, scan.values, scan.status) == ("A", {}, SCAN_FAILED)
     assert scan.status_detail == "no reading in 3 s here"
 
 
@@ -114,7 +114,7 @@ def test_a_fixed_sensor_needs_no_robot() -> None:
     (scan,) = scans.due(10 * S)
     assert (scan.tag_id, scan.pose, scan.stamp_ns) == ("B", TAGS["B"], 9 * S)
     assert scan.source == FIXED_SOURCE
-    assert scan.readings == (Reading("co2", 404.5),)
+    assert scan.values == {"co2": 404.5}
     assert list(scans.due(30 * S)) == []
 
 
@@ -158,7 +158,7 @@ def test_mean_and_spread_match_their_definitions(values: list[float]) -> None:
     for value in values:
         read(scans, 1, value)
     (scan,) = move(scans, 2, 9.0)
-    assert scan.readings[0].value == pytest.approx(statistics.fmean(values), abs=1e-6)
+    assert scan.values["temperature"] == pytest.approx(statistics.fmean(values), abs=1e-6)
     spread = float(scan.status_detail.split("±")[1].split()[0])
     assert spread == pytest.approx(statistics.stdev(values), rel=0.06, abs=1e-6)
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from lupin_twin.core.parameters import FARTHEST_M
-from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import Observation, Pose, TwinStore
 from lupin_twin.field.grid import far_off_tags, reach_of
 
 CASES: dict[str, Any] = json.loads(
@@ -35,7 +35,7 @@ def test_tags_are_named_and_those_without_a_pose_are_not_far_off() -> None:
     store = TwinStore()
     for index, x in enumerate((0.0, 1.0, 2.0, 5000.0)):
         store.record(
-            Scan(f"tag {index}", 1, (Reading("co2", 1.0),), Pose(x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+            Observation(f"tag {index}", 1, {"co2": 1.0}, Pose(x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
         )
-    store.record(Scan("nowhere", 1, (Reading("co2", 1.0),)))
+    store.record(Observation("nowhere", 1, {"co2": 1.0}))
     assert far_off_tags(store.snapshot(1, "map").tags) == ["tag 3"]

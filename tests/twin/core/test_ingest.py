@@ -10,71 +10,74 @@ import pytest
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.ingest import Received
-from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import Flower, Observation, Pin, Pose, TwinStore
 from lupin_twin.ros.convert import pose_message, pose_of
 from tests.support.store import S, at
 
 NOW_NS = 100 * S
 SKIPPED = 3
-READINGS = (Reading("co2", 1.0),)
+READINGS = {"co2": 1.0}
 
 
 SENT: dict[str, Any] = {"pose": at(1.0, 2.0), "source": "robot", "own_stamp_ns": 4 * S}
 
 
+Received = tuple[str, Observation]
+
+
 def received_reading(frame_id: str = "map", **changes: Any) -> Received:
-    return Received(0, frame_id, Scan("1", 3 * S, READINGS, **(SENT | changes)))
+    return frame_id, Observation("1", 3 * S, READINGS, **(SENT | changes))
 
 
 def received_inspection(**changes: Any) -> Received:
-    return Received(1, "map", Inspection("1", 0, Flower("rose", 0.9), **(SENT | changes)))
+    sent = Observation("1", 0, kind=1, flower=Flower("rose", 0.9), **(SENT | changes))
+    return "map", sent
 
 
 def reason_of(received: Received) -> Reason | None:
-    write = ingest.observation(received, "map", NOW_NS)
+    write = ingest.observation(*received, "map", NOW_NS)
     return write.reason if isinstance(write, Drop) else None
 
 
 @pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
 def test_a_scan_without_a_stamp_has_the_time_of_its_sensors(own_s: int, at_s: int) -> None:
-    write = ingest.observation(received_reading(own_stamp_ns=own_s * S), "map", NOW_NS)
-    assert isinstance(write, Scan)
+    write = ingest.observation(*received_reading(own_stamp_ns=own_s * S), "map", NOW_NS)
+    assert isinstance(write, Observation)
     assert (write.stamp_ns, write.own_stamp_ns) == (at_s * S, (own_s or 3) * S)
 
 
 def test_a_failed_scan_keeps_its_readings_and_reason_and_loses_its_pose() -> None:
     received = received_reading(status=SKIPPED, status_detail="no time")
-    assert ingest.observation(received, "map", NOW_NS) == Scan(
+    assert ingest.observation(*received, "map", NOW_NS) == Observation(
         "1", 4 * S, READINGS, None, SKIPPED, "no time", "robot", 4 * S
     )
 
 
 def test_an_inspection_has_the_result_of_the_camera() -> None:
-    assert ingest.observation(received_inspection(), "map", NOW_NS) == Inspection(
-        "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
+    assert ingest.observation(*received_inspection(), "map", NOW_NS) == Observation(
+        "1", 4 * S, {}, at(1.0, 2.0), 0, "", "robot", 4 * S, kind=1, flower=Flower("rose", 0.9)
     )
 
 
 def test_a_failed_inspection_is_a_failed_attempt_without_its_payload() -> None:
     received = received_inspection(status=SKIPPED, status_detail="dark")
-    assert ingest.observation(received, "map", NOW_NS) == Inspection(
-        "1", 4 * S, None, None, SKIPPED, "dark", "robot", 4 * S
+    assert ingest.observation(*received, "map", NOW_NS) == Observation(
+        "1", 4 * S, {}, None, SKIPPED, "dark", "robot", 4 * S, kind=1
     )
 
 
 @pytest.mark.parametrize(("length", "stored"), [(256, 256), (257, 256), (10_000, 256)])
 def test_a_long_text_of_a_producer_is_cut_and_drops_nothing(length: int, stored: int) -> None:
     received = received_reading(source="s" * length, status_detail="d" * length)
-    write = ingest.observation(received, "map", NOW_NS)
-    assert isinstance(write, Scan)
+    write = ingest.observation(*received, "map", NOW_NS)
+    assert isinstance(write, Observation)
     assert (len(write.source), len(write.status_detail)) == (stored, stored)
     assert write.source.endswith("…") == (length > stored)
 
 
 @pytest.mark.parametrize(("kind", "name"), [(2, "KIND_ANOMALY"), (77, "an unknown kind")])
 def test_other_kinds_are_dropped_with_their_name(kind: int, name: str) -> None:
-    drop = ingest.observation(Received(kind, "map", None), "map", NOW_NS)
+    drop = ingest.observation("map", Observation("", 0, kind=kind), "map", NOW_NS)
     assert isinstance(drop, Drop)
     assert drop.reason is Reason.KIND
     assert drop.on("/t") == f"dropped an observation on /t: kind {kind} ({name}) is not a tag's"
@@ -152,18 +155,19 @@ def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> Non
 
 def test_an_accepted_write_is_stored_and_known_and_a_refused_one_is_neither() -> None:
     store, repeats = TwinStore(), Repeats()
-    assert ingest.apply(Scan("1", S, READINGS), store, repeats) is None
-    assert ingest.apply(Inspection("1", 2 * S, Flower("rose")), store, repeats) is None
+    assert ingest.apply(Observation("1", S, READINGS), store, repeats) is None
+    seen = Observation("1", 2 * S, kind=1, flower=Flower("rose"))
+    assert ingest.apply(seen, store, repeats) is None
     assert ingest.apply(Pin("1", at(1.0)), store, repeats) is None
     [tag] = store.snapshot(S, "map").tags
     assert ([r.value for r in tag.readings], tag.flower.species) == ([1.0], "rose")
     assert tag.pose == at(1.0)
-    assert repeats.news(Scan("1", S, READINGS)) is None
+    assert repeats.news(Observation("1", S, READINGS)) is None
     too_long = "x" * (MAX_TEXT_LENGTH + 1)
-    for write in (Pin(too_long, at(1.0)), Scan(too_long, S), Inspection(too_long, S, None)):
+    for write in (Pin(too_long, at(1.0)), Observation(too_long, S)):
         drop = ingest.apply(write, store, repeats)
         assert drop is not None
         assert drop.reason is Reason.REJECTED
         assert drop.why.startswith("tag_id 'x")
         assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
-    assert repeats.news(Scan(too_long, S)) is not None
+    assert repeats.news(Observation(too_long, S)) is not None

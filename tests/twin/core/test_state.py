@@ -18,20 +18,12 @@ from lupin_twin.core.state import (
     Attempt,
     Bloom,
     Flower,
-    Inspection,
+    Observation,
     Reading,
-    Scan,
     TagState,
     TwinStore,
 )
 from tests.support.store import S, at, inspection, scan
-
-
-def write(store: TwinStore, observation: Scan | Inspection) -> None:
-    if isinstance(observation, Scan):
-        store.record(observation)
-    else:
-        store.record_inspection(observation)
 
 
 def tag(store: TwinStore, tag_id: str) -> state.TagState:
@@ -47,7 +39,7 @@ def test_the_first_pose_wins_whoever_sends_it() -> None:
         store = TwinStore()
         writes = {
             "scan": lambda x, s=store: s.record(scan("1", pose=at(x))),
-            "look": lambda x, s=store: s.record_inspection(inspection("1", pose=at(x))),
+            "look": lambda x, s=store: s.record(inspection("1", pose=at(x))),
             "pin": lambda x, s=store: s.pin("1", at(x)),
         }
         for x, name in enumerate((first, second, third)):
@@ -58,10 +50,10 @@ def test_the_first_pose_wins_whoever_sends_it() -> None:
 def test_a_write_without_news_is_no_new_revision_even_of_what_is_no_number() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
-    store.record_inspection(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
+    store.record(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
     before = tag(store, "1")
     store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
-    store.record_inspection(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
+    store.record(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
     assert tag(store, "1") is before, "changes are found by identity"
     store.record(scan("1", at_s=10.0, pose=at(1.0), co2=9.0))
     assert store.observation_count == 3, "it pins the tag"
@@ -70,7 +62,7 @@ def test_a_write_without_news_is_no_new_revision_even_of_what_is_no_number() -> 
 def test_a_late_scan_with_the_same_value_is_a_new_revision_as_derived_values_may_go() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=10.0, temperature=20.0, humidity=50.0))
-    store.record_inspection(inspection("1", at_s=30.0, species="rose"))
+    store.record(inspection("1", at_s=30.0, species="rose"))
     store.record(scan("1", at_s=20.0, temperature=20.0))
     assert store.observation_count == 3
 
@@ -100,9 +92,9 @@ def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_ord
 
 BLOOM = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
 # What gives a write its size, and the largest size allowed.
-BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
+BOUNDED: dict[str, tuple[Callable[[int], Observation], int]] = {
     "readings": (
-        lambda n: Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(n))),
+        lambda n: Observation("1", S, {f"s{i}": 0.0 for i in range(n)}),
         drops.MAX_SENSORS_PER_TAG,
     ),
     "blooms": (lambda n: inspection("1", blooms=(BLOOM,) * n), drops.MAX_BLOOMS_PER_TAG),
@@ -110,8 +102,8 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
         lambda n: inspection("1", footprint=((0.0, 0.0, 0.0),) * n),
         drops.MAX_FOOTPRINT_POINTS,
     ),
-    "the tag_id of a scan": (lambda n: Scan("t" * n, S), drops.MAX_TEXT_LENGTH),
-    "a sensor's name": (lambda n: Scan("1", S, (Reading("s" * n, 0.0),)), drops.MAX_TEXT_LENGTH),
+    "the tag_id of a scan": (lambda n: Observation("t" * n, S), drops.MAX_TEXT_LENGTH),
+    "a sensor's name": (lambda n: Observation("1", S, {"s" * n: 0.0}), drops.MAX_TEXT_LENGTH),
     "the tag_id of a look": (lambda n: inspection("t" * n), drops.MAX_TEXT_LENGTH),
     "species": (lambda n: inspection("1", species="r" * n), drops.MAX_TEXT_LENGTH),
     "a bloom's species": (
@@ -125,11 +117,11 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
 def test_exactly_the_limit_is_allowed_and_one_more_is_refused_with_both_numbers(what: str) -> None:
     make, limit = BOUNDED[what]
     store = TwinStore()
-    write(store, make(limit))
+    store.record(make(limit))
     before = store.snapshot(0, "map").tags
     assert store.observation_count == len(before) == 1
     with pytest.raises(Rejected, match=rf"{limit + 1}\b.*limit is {limit}$"):
-        write(store, make(limit + 1))
+        store.record(make(limit + 1))
     assert store.snapshot(0, "map").tags == before
     assert store.observation_count == 1
 
@@ -155,20 +147,20 @@ def test_the_total_of_all_tags_is_limited_and_known_ones_go_on(
     monkeypatch.setattr(state, "MAX_ITEMS", 4)
     store = TwinStore()
     store.record(scan("1", co2=1.0))
-    store.record_inspection(inspection("2", blooms=(BLOOM, BLOOM), footprint=((0.0, 0.0, 0.0),)))
+    store.record(inspection("2", blooms=(BLOOM, BLOOM), footprint=((0.0, 0.0, 0.0),)))
     for one_too_many in (
         scan("1", light=1.0),
         scan("3", co2=1.0),
         inspection("1", blooms=(BLOOM,)),
     ):
         with pytest.raises(Rejected, match="of all tags: 5, the limit is 4"):
-            write(store, one_too_many)
+            store.record(one_too_many)
     assert [t.tag_id for t in store.snapshot(0, "map").tags] == ["1", "2"]
     store.record(scan("1", co2=2.0))
     assert tag(store, "1").readings[0].value == 2.0
     store.pin("3", at(1.0))
     # An inspection with one flower less makes room for one more reading.
-    store.record_inspection(inspection("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
+    store.record(inspection("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
     store.record(scan("3", co2=3.0))
     assert tag(store, "3").readings[0].value == 3.0
 
@@ -199,16 +191,15 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
     tags: dict[str, TagState] = {}
     for tag_id in dict.fromkeys(write.tag_id for write in writes):
         own = [write for write in writes if write.tag_id == tag_id]
-        names = dict.fromkeys(r.name for w in own if isinstance(w, Scan) for r in w.readings)
+        names = dict.fromkeys(name for w in own for name in w.values)
         attempted = sorted(own, key=lambda write: write.stamp_ns)
         seen = [write for write in attempted if brings(write)]
         values = {
-            reading.name: Reading(reading.name, reading.value, write.stamp_ns)
+            name: Reading(name, value, write.stamp_ns)
             for write in attempted
-            if isinstance(write, Scan)
-            for reading in write.readings
+            for name, value in write.values.items()
         }
-        looks = [w for w in attempted if isinstance(w, Inspection) and w.flower is not None]
+        looks = [w for w in attempted if w.flower is not None]
         last_observed = seen[-1] if seen else attempted[0]
         tags[tag_id] = TagState(
             tag_id,
@@ -223,26 +214,24 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
 
 
 def brings(write: Write) -> bool:
-    if isinstance(write, Scan):
-        return write.status == STATUS_OK or bool(write.readings)
-    return bool(write.flower)
+    return write.status == STATUS_OK or bool(write.values)
 
 
-Write = Scan | Inspection
+Write = Observation
 TAG_IDS = st.sampled_from(["a", "b"])
 STAMPS = st.integers(1, 30).map(lambda at_s: at_s * S)
 POSES = st.one_of(st.none(), st.integers(-5, 5).map(float).map(at))
 STATUS = st.sampled_from([0, 2])
 SENSORS = st.sets(st.sampled_from(["co2", "light"])).map(sorted)
 SCANS = st.builds(
-    lambda tag_id, stamp_ns, names, pose, status: Scan(
-        tag_id, stamp_ns, tuple(Reading(name, 0.0) for name in names), pose, status
+    lambda tag_id, stamp_ns, names, pose, status: Observation(
+        tag_id, stamp_ns, dict.fromkeys(names, 0.0), pose, status
     ),
     TAG_IDS, STAMPS, SENSORS, POSES, STATUS,
 )  # fmt: skip
 INSPECTIONS = st.builds(
-    lambda tag_id, stamp_ns, pose, status: Inspection(
-        tag_id, stamp_ns, None if status else Flower(), pose, status
+    lambda tag_id, stamp_ns, pose, status: Observation(
+        tag_id, stamp_ns, {}, pose, status, kind=1, flower=None if status else Flower()
     ),
     TAG_IDS, STAMPS, POSES, STATUS,
 )  # fmt: skip
@@ -251,11 +240,9 @@ STEPS = st.lists(SCANS | INSPECTIONS | st.integers(1, 30), max_size=25)
 
 def numbered(write: Write, number: int) -> Write:
     """The write with a value of its own, so that it differs from all others."""
-    if isinstance(write, Scan):
-        readings = tuple(replace(reading, value=float(number)) for reading in write.readings)
-        return replace(write, readings=readings, status_detail=str(number))
+    values = dict.fromkeys(write.values, float(number))
     flower = None if write.flower is None else Flower(flower_count=number)
-    return replace(write, flower=flower, status_detail=str(number))
+    return replace(write, values=values, flower=flower, status_detail=str(number))
 
 
 @given(STEPS)
@@ -276,7 +263,7 @@ def test_the_store_equals_the_simplest_one(steps: list[Write | int]) -> None:
         written.append(write)
         before = {t.tag_id: t for t in store.snapshot(0, "map").tags}
         count = store.observation_count
-        store.record(write) if isinstance(write, Scan) else store.record_inspection(write)
+        store.record(write)
         after = tag(store, write.tag_id)
         shown = [as_shown(each) for each in (before.get(write.tag_id), after)]
         assert store.observation_count == count + (shown[0] != shown[1])

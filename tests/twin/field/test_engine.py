@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import Observation, Pose, TwinStore
 from lupin_twin.field import idw
 from lupin_twin.field.engine import (
     MAX_ENTRIES,
@@ -58,11 +58,11 @@ def rules_of(**changes: Any) -> FieldRules:
     return FieldRules(**{**given, **changes})
 
 
-def scan(tag_id: str, x: float, y: float, value: float) -> Scan:
-    return Scan(
+def scan(tag_id: str, x: float, y: float, value: float) -> Observation:
+    return Observation(
         tag_id=tag_id,
         stamp_ns=1,
-        readings=(Reading("temperature", value),),
+        values={"temperature": value},
         pose=Pose(x, y, 0.5, 0.0, 0.0, 0.0, 1.0),
     )
 

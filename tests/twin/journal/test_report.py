@@ -20,8 +20,8 @@ from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import SHELVE, Note
-from lupin_twin.core.past import PastWrite, RunSpan
-from lupin_twin.core.state import Pin, Reading
+from lupin_twin.core.past import RunSpan
+from lupin_twin.core.state import Observation, Pin, Reading
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import SiteLog
 from lupin_twin.journal.writes import put_note
@@ -135,7 +135,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
     counts = found["counts"]
     assert counts["scans"] == len(scans)
     assert counts["failed"] == sum(it.status != 0 for it in within)
-    assert counts["inspections"] == sum(it.has_seen for it in within)
+    assert counts["inspections"] == sum(it.flower is not None for it in within)
     assert not {it.tag_id for it in scans} & set(found["never_scanned"])
     assert counts["tags"] == counts["tags_scanned"] + len(found["never_scanned"])
     check_sensors(found["sensors"], [it for it in within if it.kind == 0])
@@ -160,11 +160,10 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
     assert counts["cleared"] == len(right) - counts["active"]
 
 
-def check_sensors(found: list[dict[str, Any]], scans: list[PastWrite]) -> None:
+def check_sensors(found: list[dict[str, Any]], scans: list[Observation]) -> None:
     values: dict[str, list[tuple[float, str, int]]] = {}
     for it in scans:
-        pairs = dict(zip(it.sensors, it.values, strict=True))
-        readings = [Reading(name, value, it.stamp_ns) for name, value in pairs.items()]
+        readings = [Reading(name, value, it.stamp_ns) for name, value in it.values.items()]
         for reading in (*readings, *derive(readings)):
             mine = values.setdefault(reading.name, [])
             mine.append((reading.value, it.tag_id, it.stamp_ns))
@@ -188,7 +187,7 @@ def check_sensors(found: list[dict[str, Any]], scans: list[PastWrite]) -> None:
 
 
 def check_silences(
-    found: list[dict[str, Any]], reported: list[PastWrite], start_ns: int, end_ns: int
+    found: list[dict[str, Any]], reported: list[Observation], start_ns: int, end_ns: int
 ) -> None:
     scans = [
         sorted({it.stamp_ns for it in reported if (it.tag_id, it.kind) == (tag_id, 0)})

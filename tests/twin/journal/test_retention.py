@@ -154,7 +154,7 @@ def test_a_missing_journal_gets_a_past_that_continues(tmp_path: Path) -> None:
     assert filled(path)
     assert is_whole(path)
     assert mark(path) == (START, NOW)
-    assert {type(row).__name__ for row in known(path, CLOCK)} == {"Pin", "Scan", "Inspection"}
+    assert {getattr(row, "kind", "pin") for row in known(path, CLOCK)} == {"pin", 0, 1}
     # Past and present are one run of the clock.
     append(path, [scan(at_ns=NOW + SECOND)], CLOCK)
     assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]

@@ -3,8 +3,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lupin_twin.core.past import PastWrite, PastWrites, WritesRequest, recent_of
-from lupin_twin.core.state import NO_FLOWER
+from lupin_twin.core.past import PastWrites, WritesRequest, recent_of
+from lupin_twin.core.state import NO_FLOWER, Observation
 from lupin_twin.journal.writes import recent, writes
 from tests.support.journal import SECOND, inspection, pin, scan
 from tests.support.log_life import BEGUN, Life, failure, lived
@@ -28,15 +28,15 @@ def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copie
         reported = [(w.tag_id, w.stamp_ns - BEGUN, w.kind, w.status) for w in whole.writes]
         assert reported[:3] == [("7", 5, 0, 0), ("7", 4, 1, 0), ("8", 3, 0, 2)]
         seen = whole.writes[1]
-        assert (seen.species, seen.anomaly, seen.bug_count, seen.has_seen) == (
-            ("lupin", True, 1, True)
+        assert seen.flower is not None
+        assert (seen.flower.species, seen.flower.anomaly, seen.flower.bug_count) == (
+            ("lupin", True, 1)
         )
-        assert whole.writes[3].sensors == ("co2", "light")
-        assert whole.writes[3].values == (400.0, 1.0)
+        assert whole.writes[3].values == {"co2": 400.0, "light": 1.0}
         assert [(span.start_ns, span.end_ns) for span in whole.spans] == [(0, 2**63 - 1)]
         assert requested(copied(life.connection)) == whole
 
-        found: list[PastWrite] = []
+        found: list[Observation] = []
         part = requested(life.connection, max_count=3)
         while True:
             found += part.writes
@@ -102,6 +102,5 @@ def test_an_uncertain_species_is_left_out(tmp_path: Path) -> None:
             one = inspection("7", BEGUN + number)
             flower = replace(one.flower or NO_FLOWER, confidence=confidence)
             life.write([replace(one, flower=flower)])
-        assert [write.species for write in requested(life.connection).writes] == (
-            ["", "", "lupin", "lupin"]
-        )
+        seen = [write.flower for write in requested(life.connection).writes]
+        assert [it.sure_species for it in seen if it] == ["", "", "lupin", "lupin"]

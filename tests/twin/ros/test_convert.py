@@ -14,7 +14,7 @@ from lupin_msgs.msg import Observation as ObservationMsg
 from lupin_msgs.srv import GetEstimateReport
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin.core import history, ingest
+from lupin_twin.core import ingest, state
 from lupin_twin.core.diagnostics import ERROR, OK, Finding
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
@@ -22,9 +22,9 @@ from lupin_twin.core.state import (
     Attempt,
     Bloom,
     Flower,
+    Observation,
     Pose,
     Reading,
-    Scan,
     Snapshot,
     TagState,
 )
@@ -113,22 +113,20 @@ def test_a_tag_reading_is_received_field_by_field() -> None:
         "1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED, stamp_s=4.0
     )
     msg.tag_reading.stamp.sec = 3
-    found = convert.received(msg)
-    assert (found.kind, found.frame_id) == (0, "map")
-    assert found.sent == Scan(
-        "1", 3 * S, (Reading("co2", 1.0),), Pose.at(1.0, 2.0), 3, "", "test", 4 * S
-    )
+    frame_id, sent = convert.received(msg)
+    assert frame_id == "map"
+    assert sent == Observation("1", 3 * S, {"co2": 1.0}, Pose.at(1.0, 2.0), 3, "", "test", 4 * S)
 
 
 @pytest.mark.parametrize(("own", "counts"), [("", "odom"), ("camera", "camera")])
 def test_the_frame_of_a_flowers_own_pose_takes_precedence(own: str, counts: str) -> None:
     msg = messages.inspection("1", at=(1.0, 2.0), frame_id="odom", pose_frame_id=own)
-    assert convert.received(msg).frame_id == counts
+    assert convert.received(msg)[0] == counts
 
 
 def test_kinds_and_status_are_those_of_the_message() -> None:
-    assert history.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
-    assert history.KIND_FLOWER == ObservationMsg.KIND_FLOWER
+    assert state.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
+    assert state.KIND_FLOWER == ObservationMsg.KIND_FLOWER
     assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
     assert STATUS_OK == ObservationMsg.STATUS_OK
 

@@ -15,7 +15,7 @@ import pytest
 
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.core.state import Flower, Inspection, Pin, Reading, Scan, TwinStore
+from lupin_twin.core.state import Flower, Observation, Pin, TwinStore
 from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.paths import journal_path, state_folder
@@ -115,15 +115,15 @@ def test_a_restored_state_is_logged_once(tmp_path: Path) -> None:
         memory.close()
 
 
-def at(write: Scan | Inspection, stamp_ns: int) -> Scan | Inspection:
+def at(write: Observation, stamp_ns: int) -> Observation:
     return replace(write, stamp_ns=stamp_ns, own_stamp_ns=stamp_ns)
 
 
-SCAN = Scan("7", NOW, (Reading("t", 21.5), Reading("h", 0.1)), HERE, source="a", own_stamp_ns=NOW)
-PART = Scan("7", NOW - 5 * S, (Reading("co2", 400.0),), source="b", own_stamp_ns=NOW - 5 * S)
-FAILED = Scan("7", NOW + S, (), None, 2, "no answer", "a", NOW + S)
-LOOK = Inspection("8", NOW + S, FLOWER, source="a", own_stamp_ns=NOW + S)
-BLIND = Inspection("8", NOW + 2 * S, None, None, 1, "dark", "a", NOW + 2 * S)
+SCAN = Observation("7", NOW, {"t": 21.5, "h": 0.1}, HERE, source="a", own_stamp_ns=NOW)
+PART = Observation("7", NOW - 5 * S, {"co2": 400.0}, source="b", own_stamp_ns=NOW - 5 * S)
+FAILED = Observation("7", NOW + S, {}, None, 2, "no answer", "a", NOW + S)
+LOOK = Observation("8", NOW + S, source="a", own_stamp_ns=NOW + S, kind=1, flower=FLOWER)
+BLIND = Observation("8", NOW + 2 * S, {}, None, 1, "dark", "a", NOW + 2 * S, kind=1)
 WRITES = (SCAN, PART, FAILED, LOOK, BLIND, Pin("8", HERE), Pin("9", HERE))
 
 

@@ -13,7 +13,8 @@ from functools import partial
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
-from lupin_msgs.msg import DiscoveredTags, Observation
+from lupin_msgs.msg import DiscoveredTags
+from lupin_msgs.msg import Observation as ObservationMsg
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -41,7 +42,7 @@ from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import Drop, Reason, Rejected
 from lupin_twin.core.parameters import FARTHEST_M
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Scan
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Observation, Pose
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 
@@ -87,7 +88,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._moved_s = 0.0
         self._started_s = time.monotonic()
         self._observations = self.create_publisher(
-            Observation, interfaces.OBSERVATIONS.name, qos_of(interfaces.OBSERVATIONS)
+            ObservationMsg, interfaces.OBSERVATIONS.name, qos_of(interfaces.OBSERVATIONS)
         )
         self._tags = self.create_publisher(
             DiscoveredTags, interfaces.DISCOVERED_TAGS.name, latched(1)
@@ -435,7 +436,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if not self._is_check:
             publisher.publish(message)
 
-    def _publish(self, scans: Iterable[Scan]) -> None:
+    def _publish(self, scans: Iterable[Observation]) -> None:
         for scan in scans:
             self._built += 1
             self._send(self._observations, convert.observation_message(scan, self._config.frame_id))

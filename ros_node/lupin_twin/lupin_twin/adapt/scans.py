@@ -10,13 +10,13 @@ All times are ROS time, ns. The robot is at the nearest tag within its reach. It
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
 from lupin_twin.adapt.config import Config
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Pose, Reading, Scan
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Observation, Pose
 
 LEAVES: Final = 1.1
 # A stop of at least this long without a reading is a failed scan; a shorter one just passed by.
@@ -82,7 +82,7 @@ class Scans:
         self._fixed: dict[str, _Window] = {}
         self._now_ns = 0
 
-    def move(self, x: float, y: float, now_ns: int) -> Iterator[Scan]:
+    def move(self, x: float, y: float, now_ns: int) -> Iterator[Observation]:
         """Move the robot to (x, y), m; yields the scans that end with that."""
         yield from self.due(now_ns)
         self._seen_ns = now_ns
@@ -95,7 +95,7 @@ class Scans:
         else:
             yield from self._be_at(tag_id, now_ns)
 
-    def lose(self, now_ns: int) -> Iterator[Scan]:
+    def lose(self, now_ns: int) -> Iterator[Observation]:
         """Note that the robot's position is unknown; yields the scans that end with that."""
         yield from self.due(now_ns)
         yield from self._be_at(None, now_ns)
@@ -111,9 +111,11 @@ class Scans:
             return True
         return False
 
-    def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> Scan:
+    def failed(
+        self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False
+    ) -> Observation:
         """Return a failed attempt at a tag."""
-        return self._built(tag_id, now_ns, (), detail, is_fixed=is_fixed)
+        return self._built(tag_id, now_ns, {}, detail, is_fixed=is_fixed)
 
     def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
         """Add a reading, in the sensor's unit; returns False if there is no tag or no room for it.
@@ -130,7 +132,7 @@ class Scans:
             return False
         return window.add(sensor, value, stamp_ns)
 
-    def due(self, now_ns: int) -> Iterator[Scan]:
+    def due(self, now_ns: int) -> Iterator[Observation]:
         """Yield the scans whose window is over; call it once a second, and before each move."""
         if now_ns < self._now_ns:  # the clock went back: a new run
             self.tag, self._visit, self._fixed = None, None, {}
@@ -147,14 +149,16 @@ class Scans:
             yield from self._ended(now_ns)
             self._visit = _Window(now_ns)
 
-    def _be_at(self, tag_id: str | None, now_ns: int, cell: Pose | None = None) -> Iterator[Scan]:
+    def _be_at(
+        self, tag_id: str | None, now_ns: int, cell: Pose | None = None
+    ) -> Iterator[Observation]:
         if tag_id == self.tag:
             return
         yield from self._ended(now_ns)
         self.tag, self._cell = tag_id, cell
         self._visit = None if tag_id is None else _Window(now_ns)
 
-    def _ended(self, now_ns: int) -> Iterator[Scan]:
+    def _ended(self, now_ns: int) -> Iterator[Observation]:
         window, tag_id = self._visit, self.tag
         if window is None or tag_id is None:
             return
@@ -164,27 +168,27 @@ class Scans:
             stayed_s = (now_ns - window.begun_ns) / NANOSECONDS_PER_SECOND
             yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
-    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> Scan:
+    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> Observation:
         means = sorted(window.means.items())
         detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
-        readings = tuple(Reading(name, mean.mean) for name, mean in means)
-        return self._built(tag_id, window.newest_ns, readings, detail, is_fixed=is_fixed)
+        values = {name: mean.mean for name, mean in means}
+        return self._built(tag_id, window.newest_ns, values, detail, is_fixed=is_fixed)
 
     def _built(
         self,
         tag_id: str,
         stamp_ns: int,
-        readings: tuple[Reading, ...],
+        values: Mapping[str, float],
         detail: str,
         *,
         is_fixed: bool,
-    ) -> Scan:
-        return Scan(
+    ) -> Observation:
+        return Observation(
             tag_id,
             stamp_ns,
-            readings,
+            values,
             self.places.get(tag_id, self._cell if tag_id == self.tag else None),
-            STATUS_OK if readings else SCAN_FAILED,
+            STATUS_OK if values else SCAN_FAILED,
             detail[:MAX_TEXT_LENGTH],
             FIXED_SOURCE if is_fixed else VISIT_SOURCE,
         )

@@ -12,11 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from lupin_twin.core.state import Inspection, Scan
-
-# lupin_msgs/Observation
-KIND_TAG_READING: Final = 0
-KIND_FLOWER: Final = 1
+from lupin_twin.core.state import Observation
 
 # Replaces the producer's stamp of an observation that was moved when the clock went back. No
 # observation received later is recognised as the same.
@@ -25,14 +21,9 @@ KNOWN_BY_NOTHING: Final = -1
 Key = tuple[int, int, str]
 
 
-def kind_of(write: Scan | Inspection) -> int:
-    """The kind of the observation, as in lupin_msgs/Observation."""
-    return KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER
-
-
-def key_of(write: Scan | Inspection) -> Key:
+def key_of(write: Observation) -> Key:
     """What identifies the observation among those of its tag."""
-    return kind_of(write), write.own_stamp_ns or write.stamp_ns, write.source
+    return write.kind, write.own_stamp_ns or write.stamp_ns, write.source
 
 
 # Observations remembered per tag (more than a publisher latches), and for all tags together.
@@ -46,7 +37,7 @@ class Repeats:
     def __init__(self) -> None:
         self._tags: dict[str, dict[Key, tuple[int, frozenset[str]]]] = {}
 
-    def news(self, write: Scan | Inspection) -> Scan | Inspection | None:
+    def news(self, write: Observation) -> Observation | None:
         """Return the part of an observation that was not received before; None if there is none.
 
         The earliest of its times counts: one with a stamp from the future was made when it was
@@ -56,23 +47,18 @@ class Repeats:
         known = self._tags.get(write.tag_id, {}).get(key_of(write))
         if known is None:
             return write
-        if not isinstance(write, Scan):
-            return None
         known_ns, names = known
-        readings = tuple(reading for reading in write.readings if reading.name not in names)
+        values = {name: value for name, value in write.values.items() if name not in names}
         stamp_ns = min(write.stamp_ns, known_ns)
-        return replace(write, stamp_ns=stamp_ns, readings=readings) if readings else None
+        return replace(write, stamp_ns=stamp_ns, values=values) if values else None
 
-    def add(self, write: Scan | Inspection) -> None:
+    def add(self, write: Observation) -> None:
         """Remember an observation, or more of its sensors; a tag's oldest ones make room."""
         if write.own_stamp_ns == KNOWN_BY_NOTHING:
             return
         tag, key = self._tags.setdefault(write.tag_id, {}), key_of(write)
-        names = (
-            frozenset(r.name for r in write.readings) if isinstance(write, Scan) else frozenset()
-        )
-        known_ns, known = tag.pop(key, (write.stamp_ns, names))
-        tag[key] = known_ns, known | names
+        known_ns, known = tag.pop(key, (write.stamp_ns, frozenset()))
+        tag[key] = known_ns, known.union(write.values)
         while len(tag) > max(1, min(KNOWN_PER_TAG, MAX_KNOWN // len(self._tags))):
             del tag[next(iter(tag))]
 

@@ -8,22 +8,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected, cut
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import (
+    KIND_FLOWER,
+    KIND_TAG_READING,
     STATUS_OK,
-    Inspection,
+    Observation,
     Pin,
     Pose,
-    Scan,
     TwinStore,
     Write,
 )
 
-# lupin_msgs/Observation; the other kinds are in `history`.
+# lupin_msgs/Observation; the other kinds are in `state`.
 KIND_ANOMALY: Final = 2
 
 # Replaces the `w` of a half turn, which is 0, because 0 stands for no pose.
@@ -33,43 +34,34 @@ HALF_TURN_W: Final = 1e-9
 _QUOTED: Final = 64
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
-    """An observation as it was sent; its pose and stamps may be invalid.
-
-    `sent` is None if the kind is not about a tag. `stamp_ns` of a scan is when the sensors were
-    read, `own_stamp_ns` is the header's stamp.
-    """
-
-    kind: int
-    frame_id: str
-    sent: Scan | Inspection | None
-
-
 # Discovered tags, each with a function that makes its pose as sent. A producer publishes all tags
 # again and again, so a pose is made only when it is needed.
 ReceivedTags = Iterable[tuple[str, Callable[[], Pose]]]
 
 
-def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspection | Drop:
-    """Return what an observation writes at `now_ns`; it has to be in the frame `frame_id`."""
-    sent = received.sent
-    if sent is None:
-        name = "KIND_ANOMALY" if received.kind == KIND_ANOMALY else "an unknown kind"
-        why = f"kind {received.kind} ({name}) is not a tag's"
-        return Drop(Reason.KIND, why, "dropped an observation", case=str(received.kind))
-    if dropped := wrong_frame(received.frame_id, frame_id) or no_tag_id(sent.tag_id):
+def observation(
+    own_frame_id: str, sent: Observation, frame_id: str, now_ns: int
+) -> Observation | Drop:
+    """Return what an observation writes at `now_ns`; it has to be in the frame `frame_id`.
+
+    It is `sent` in its own frame; its pose and stamps may be invalid. The `stamp_ns` of a scan is
+    when the sensors were read, `own_stamp_ns` the header's stamp.
+    """
+    if sent.kind not in (KIND_TAG_READING, KIND_FLOWER):
+        name = "KIND_ANOMALY" if sent.kind == KIND_ANOMALY else "an unknown kind"
+        why = f"kind {sent.kind} ({name}) is not a tag's"
+        return Drop(Reason.KIND, why, "dropped an observation", case=str(sent.kind))
+    if dropped := wrong_frame(own_frame_id, frame_id) or no_tag_id(sent.tag_id):
         return dropped
     # Without a stamp in the header, a scan's time is when the sensors were read.
     own_stamp_ns = sent.own_stamp_ns or sent.stamp_ns
     succeeded = sent.status == STATUS_OK
-    if isinstance(sent, Inspection) and not succeeded:
-        # A failed inspection's payload holds defaults, not a result: it would clear a pest unseen.
-        sent = replace(sent, flower=None)
     return replace(
         sent,
         stamp_ns=observed_at(own_stamp_ns, now_ns),
         pose=scanned_pose(sent.pose) if succeeded and sent.pose else None,
+        # A failed inspection's payload holds defaults, not a result: it would clear a pest unseen.
+        flower=sent.flower if succeeded else None,
         # Cut to what can be stored, so that nothing is dropped because of a text.
         status_detail=cut(sent.status_detail),
         source=cut(sent.source),
@@ -111,10 +103,7 @@ def apply(write: Write, store: TwinStore, repeats: Repeats) -> Drop | None:
             if write.pose is not None:
                 store.pin(write.tag_id, write.pose)
             return None
-        if isinstance(news, Scan):
-            store.record(news)
-        else:
-            store.record_inspection(news)
+        store.record(news)
     except Rejected as error:
         return Drop(Reason.REJECTED, str(error))
     repeats.add(news)

@@ -17,7 +17,7 @@ from statistics import median
 from typing import Final
 
 from lupin_twin.core.drops import too_long
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, value
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Observation, value
 
 # Ending of an error message if the same request may succeed a little later.
 ASK_AGAIN: Final = "ask again later"
@@ -275,28 +275,6 @@ class WritesRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class PastWrite:
-    """One scan or inspection, or an attempt; `kind` and `status` as in lupin_msgs/Observation.
-
-    `sensors` and `values` have one length. `has_seen`: it saw flowers, which the last three fields
-    describe. A species that the camera was not sure of is left out.
-    """
-
-    number: int
-    run: int
-    tag_id: str
-    stamp_ns: int
-    kind: int
-    status: int
-    sensors: tuple[str, ...] = ()
-    values: tuple[float, ...] = ()
-    has_seen: bool = False
-    species: str = ""
-    anomaly: bool = False
-    bug_count: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class RunSpan:
     """A period of the time axis, `start_ns <= stamp < end_ns`, and the run that it belongs to."""
 
@@ -306,13 +284,13 @@ class RunSpan:
     is_simulated: bool = False
 
 
-def recent_of(writes: Iterable[PastWrite], at_ns: int) -> tuple[PastWrite, ...]:
+def recent_of(writes: Iterable[Observation], at_ns: int) -> tuple[Observation, ...]:
     """Select the writes that are recent at a moment, from those of one run in any order."""
-    by_tag: dict[tuple[str, int], list[PastWrite]] = {}
+    by_tag: dict[tuple[str, int], list[Observation]] = {}
     for write in writes:
-        if write.stamp_ns <= at_ns and (write.values or write.has_seen):
+        if write.stamp_ns <= at_ns and (write.values or write.flower):
             by_tag.setdefault((write.tag_id, write.kind), []).append(write)
-    found: list[PastWrite] = []
+    found: list[Observation] = []
     for mine in by_tag.values():
         mine.sort(key=_in_time)
         stamps = sorted({write.stamp_ns for write in mine})[-RECENT_COUNT:]
@@ -320,20 +298,21 @@ def recent_of(writes: Iterable[PastWrite], at_ns: int) -> tuple[PastWrite, ...]:
     return tuple(sorted(found, key=_in_time))
 
 
-def _in_time(write: PastWrite) -> tuple[int, int]:
+def _in_time(write: Observation) -> tuple[int, int]:
     return write.stamp_ns, write.number
 
 
 @dataclass(frozen=True, slots=True)
 class PastWrites:
-    """Some writes, in the order of their numbers; request more after `last`, until `is_all`.
+    """Some attempts, in the order of their numbers; request more after `last`, until `is_all`.
 
-    `journal` identifies the file: numbers of different files are not comparable.
+    They have no pose, and their flowers no blooms and no footprint. `journal` identifies the file:
+    numbers of different files are not comparable.
     """
 
     journal: str
     spans: tuple[RunSpan, ...]
-    writes: tuple[PastWrite, ...]
+    writes: tuple[Observation, ...]
     last: int
     is_all: bool
 
@@ -343,6 +322,6 @@ class PastWrites:
         return self.writes[0].number if self.writes else self.last + 1
 
     @property
-    def of_newest_run(self) -> list[PastWrite]:
+    def of_newest_run(self) -> list[Observation]:
         """Those of the run of the clock that goes on."""
         return [write for write in self.writes if write.run == self.spans[-1].run]

@@ -8,7 +8,7 @@ values are immutable, so threads can share a snapshot. The store itself belongs 
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, Self, TypeVar, dataclass_transform
 
@@ -25,7 +25,10 @@ from lupin_twin.core.drops import (
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
 
-# lupin_msgs/Observation: the status of a successful attempt; the others tell why one failed.
+# lupin_msgs/Observation: the kinds of attempts at a tag, and the status of a successful one; the
+# other statuses tell why one failed.
+KIND_TAG_READING = 0
+KIND_FLOWER = 1
 STATUS_OK = 0
 
 # x, y (m) and a value, in the sensor's unit.
@@ -74,7 +77,7 @@ class Pose:
 class Reading:
     """One sensor's value, in the sensor's own unit (°C, %, ppm, lx); may be NaN or infinite.
 
-    `observed_at_ns` is None in a scan, which has one stamp for all readings, and if unknown.
+    `observed_at_ns` is None if the time is not known.
     """
 
     name: str
@@ -107,26 +110,29 @@ class Flower:
     blooms: tuple[Bloom, ...] = ()
     footprint: tuple[tuple[float, float, float], ...] = ()
 
+    @property
+    def sure_species(self) -> str:
+        """The species if the camera's confidence was at least 0.5, else an empty text."""
+        return self.species if self.confidence >= 0.5 else ""
+
 
 NO_FLOWER = Flower()
 
 
-def sure_species(species: str, confidence: float | None) -> str:
-    """The species if the camera's confidence was at least 0.5, else an empty text."""
-    return species if confidence is not None and confidence >= 0.5 else ""
-
-
 @value
-class Scan:
-    """One scan of a tag's sensors, or a failed attempt, which has no pose; see `status`.
+class Observation:
+    """One attempt at a tag: a scan of its sensors, or an inspection of its flowers; see `kind`.
 
-    `stamp_ns` is never later than now. `own_stamp_ns` is the producer's stamp, 0 if there is none;
-    a message that is received again is recognised by it. `arrival_ns` is wall time.
+    `values` has the readings by sensor, `flower` is what an inspection saw. A failed attempt (see
+    `status`) has no pose. `stamp_ns` is never later than now. `own_stamp_ns` is the producer's
+    stamp, 0 if there is none; a message that is received again is recognised by it. `arrival_ns` is
+    wall time. In a journal, it has a `number`, and belongs to a `run` of the clock; it is the same
+    observation wherever it is kept.
     """
 
     tag_id: str
     stamp_ns: int
-    readings: tuple[Reading, ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict, hash=False)
     pose: Pose | None = None
     status: int = STATUS_OK
     status_detail: str = ""
@@ -134,27 +140,15 @@ class Scan:
     own_stamp_ns: int = 0
     mission: str = ""
     arrival_ns: int = 0
-
-
-@value
-class Inspection:
-    """One inspection of a tag's flowers, or a failed attempt (`flower` None); else as `Scan`."""
-
-    tag_id: str
-    stamp_ns: int
-    flower: Flower | None
-    pose: Pose | None = None
-    status: int = STATUS_OK
-    status_detail: str = ""
-    source: str = ""
-    own_stamp_ns: int = 0
-    mission: str = ""
-    arrival_ns: int = 0
+    kind: int = KIND_TAG_READING
+    flower: Flower | None = None
+    number: int = field(default=0, compare=False)
+    run: int = field(default=0, compare=False)
 
 
 @value
 class Pin:
-    """Gives a tag its pose, from a scan, an inspection or a discovery; times as in `Scan`."""
+    """Gives a tag its pose, from an attempt or a discovery; times as in `Observation`."""
 
     tag_id: str
     pose: Pose
@@ -162,7 +156,7 @@ class Pin:
     arrival_ns: int = 0
 
 
-Write = Scan | Inspection | Pin
+Write = Observation | Pin
 
 
 @value
@@ -266,48 +260,54 @@ class TwinStore:
     _newest_ns: int = field(default=0, init=False)
     _items: int = field(default=0, init=False)
 
-    def record(self, scan: Scan) -> None:
-        """Store a scan: its readings (latest per name), its time, its pose if the tag has none.
+    def record(self, new: Observation) -> None:
+        """Store an attempt: the latest of each sensor and of flowers, and a pose if there is none.
 
-        A failed scan without readings is the tag's last attempt. Its time counts as
+        A failed attempt that observed nothing is the tag's last attempt. Its time counts as
         `last_observed_ns` only as long as nothing else was observed at the tag.
 
         Raises:
             Rejected: a text or a list is over its limit; nothing is stored then.
 
         """
-        check_texts("tag_id", scan.tag_id)
-        check_texts("a reading's name", *(reading.name for reading in scan.readings))
-        tag = self._tag(scan.tag_id)
-        readings = {reading.name: reading for reading in tag.readings}
-        for reading in scan.readings:
-            new = replace(reading, observed_at_ns=scan.stamp_ns)
-            known = readings.setdefault(reading.name, new)
-            if not _is_later(known.observed_at_ns, scan.stamp_ns) and not _is_same(known, new):
-                readings[reading.name] = new
-        check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
-        tag = replace(tag, readings=tuple(readings.values()), pose=tag.pose or scan.pose)
-        self._store_attempt(tag, scan, brought=scan.status == STATUS_OK or bool(scan.readings))
-
-    def record_inspection(self, inspection: Inspection) -> None:
-        """Store an inspection: it replaces an earlier one, unless it failed; readings stay.
-
-        Raises:
-            Rejected: a text or a list is over its limit; nothing is stored then.
-
-        """
-        flower = inspection.flower
-        check_texts("tag_id", inspection.tag_id)
+        check_texts("tag_id", new.tag_id)
+        check_texts("a reading's name", *new.values)
+        flower, at_ns = new.flower, new.stamp_ns
         if flower is not None:
             check_texts("species", flower.species, *(b.species for b in flower.blooms))
             check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
             check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
-        tag = self._tag(inspection.tag_id)
-        if flower is not None and not _is_later(tag.looked_at_ns, inspection.stamp_ns):
+        tag = self._tag(new.tag_id)
+        if flower is not None and not _is_later(tag.looked_at_ns, at_ns):
             seen = tag.flower if repr(flower) == repr(tag.flower) else flower  # NaN is not NaN
-            tag = replace(tag, flower=seen, looked_at_ns=inspection.stamp_ns)
-        tag = replace(tag, pose=tag.pose or inspection.pose)
-        self._store_attempt(tag, inspection, brought=flower is not None)
+            tag = replace(tag, flower=seen, looked_at_ns=at_ns)
+        readings = {reading.name: reading for reading in tag.readings}
+        for name, number in new.values.items():
+            reading = Reading(name, number, at_ns)
+            known = readings.setdefault(name, reading)
+            if not _is_later(known.observed_at_ns, at_ns) and not _is_same(known, reading):
+                readings[name] = reading
+        check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
+        observed_ns = self._observed.get(tag.tag_id)
+        if new.status == STATUS_OK or new.values or flower is not None:
+            observed_ns = max(observed_ns or 0, at_ns)
+        last_observed_ns = observed_ns
+        if last_observed_ns is None:
+            last_observed_ns = min(tag.last_observed_ns or at_ns, at_ns)
+        last_try = tag.last_try
+        if last_try is None or at_ns >= last_try.stamp_ns:
+            last_try = Attempt(at_ns, new.status, new.status_detail)
+        self._store(
+            replace(
+                tag,
+                readings=tuple(readings.values()),
+                pose=tag.pose or new.pose,
+                last_observed_ns=last_observed_ns,
+                last_try=last_try,
+            )
+        )
+        if observed_ns is not None:
+            self._observed[tag.tag_id] = observed_ns
 
     def pin(self, tag_id: str, pose: Pose) -> None:
         """Give a discovered tag its pose, unless it has one already.
@@ -376,21 +376,6 @@ class TwinStore:
             return known
         check_length("tags", len(self._tags) + 1, MAX_TAGS)
         return TagState(tag_id=tag_id)
-
-    def _store_attempt(self, tag: TagState, attempt: Scan | Inspection, brought: bool) -> None:
-        """Store a tag with the times of an attempt; `brought`: something was observed."""
-        at_ns, observed_ns = attempt.stamp_ns, self._observed.get(tag.tag_id)
-        if brought:
-            observed_ns = max(observed_ns or 0, at_ns)
-        last_observed_ns = observed_ns
-        if last_observed_ns is None:
-            last_observed_ns = min(tag.last_observed_ns or at_ns, at_ns)
-        last_try = tag.last_try
-        if last_try is None or at_ns >= last_try.stamp_ns:
-            last_try = Attempt(at_ns, attempt.status, attempt.status_detail)
-        self._store(replace(tag, last_observed_ns=last_observed_ns, last_try=last_try))
-        if observed_ns is not None:
-            self._observed[tag.tag_id] = observed_ns
 
     def _store(self, tag: TagState) -> None:
         """Replace a tag's state, if there is room for its growth."""

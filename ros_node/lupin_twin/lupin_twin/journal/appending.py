@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.drops import valid_text
-from lupin_twin.core.history import KIND_FLOWER, KNOWN_BY_NOTHING, kind_of
-from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
+from lupin_twin.core.history import KNOWN_BY_NOTHING
+from lupin_twin.core.state import KIND_FLOWER, Flower, Observation, Pin, Write
 from lupin_twin.journal.counts import count_rows
 from lupin_twin.journal.paths import Lock
 from lupin_twin.journal.rows import noted_number, sensor_names, weight
@@ -126,15 +126,14 @@ class Appender:
             at = (LOCAL_SITE, self.last_seq, run, tag, row.stamp_ns, row.arrival_ns)
             self._waiting["place"].append((*at, *numbers, is_copy))
             return True
-        if isinstance(row, Inspection) and row.flower is not None:
+        if row.flower is not None:
             return self._put_inspection(run, tag, row, row.flower, is_copy)
         return self._put_scan(run, tag, row, is_copy)
 
-    def _put_scan(self, run: int, tag: str, scan: Scan | Inspection, is_copy: int) -> bool:
+    def _put_scan(self, run: int, tag: str, scan: Observation, is_copy: int) -> bool:
         """A scan, or an attempt of either kind that failed."""
-        kind = kind_of(scan)
-        sent = scan.readings if isinstance(scan, Scan) else ()
-        readings = {valid_text(reading.name): reading.value for reading in sent}
+        kind = scan.kind
+        readings = {valid_text(name): value for name, value in scan.values.items()}
         stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), valid_text(scan.source)
         known = self._known((run, tag, kind), own_ns or stamp_ns, source, is_copy)
         if known is not None:
@@ -164,7 +163,7 @@ class Appender:
         return True
 
     def _put_inspection(
-        self, run: int, tag: str, inspection: Inspection, flower: Flower, is_copy: int
+        self, run: int, tag: str, inspection: Observation, flower: Flower, is_copy: int
     ) -> bool:
         at = (run, tag, KIND_FLOWER)
         source, key = valid_text(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
@@ -268,7 +267,7 @@ class Appender:
         return series
 
 
-def _own_ns(write: Scan | Inspection) -> int | None:
+def _own_ns(write: Observation) -> int | None:
     """The stamp that the write was sent with; None if that is its `stamp_ns`."""
     return None if write.own_stamp_ns == write.stamp_ns else write.own_stamp_ns
 

@@ -17,9 +17,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, SILENCE_NS, Event, Grid, RunSpan, SeriesPast, grid
-from lupin_twin.core.state import STATUS_OK
+from lupin_twin.core.state import KIND_TAG_READING, STATUS_OK
 from lupin_twin.journal import sql
 from lupin_twin.journal.rows import noted_number, numbers_of
 from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into

@@ -183,7 +183,7 @@ class JournalFile:
     def _restored(self, run: Run) -> Restored:
         known = fold(self._connection, run.root, FOREVER_NS, run.begun_seq)
         begun = next(r for r in self._runs() if r.id == run.root)
-        rows = last_rows(self._connection, begun, LATCHED)
+        rows = last_rows(SiteLog(self._connection), begun, LATCHED)
         return Restored(run, known, tuple(rows), self._appender.last_seq)
 
     def begin(
@@ -248,7 +248,7 @@ class JournalFile:
         """The clock at the last write of a run."""
         last = run.begun
         # The latest stamp is among the last rows, because only latched ones are out of order.
-        for row in reversed(last_rows(self._connection, run, most=100)):
+        for row in reversed(last_rows(SiteLog(self._connection), run, most=100)):
             if row.stamp_ns > last.stamp_ns:
                 arrival_ns = max(row.arrival_ns, last.arrival_ns)
                 last = Clock(row.stamp_ns, arrival_ns, last.is_simulated)

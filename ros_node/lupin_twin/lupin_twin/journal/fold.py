@@ -21,11 +21,10 @@ from lupin_twin.core.state import (
     STATUS_OK,
     Attempt,
     Flower,
-    Inspection,
+    Observation,
     Pin,
     Pose,
     Reading,
-    Scan,
     Snapshot,
     TagState,
     Write,
@@ -33,7 +32,7 @@ from lupin_twin.core.state import (
 from lupin_twin.journal import sql
 from lupin_twin.journal.rows import flower_of, listed_rows, named_numbers
 from lupin_twin.journal.runs import Run, runs, since_seq, span_at
-from lupin_twin.journal.schema import LOCAL_SITE
+from lupin_twin.journal.schema import LOCAL_SITE, SiteLog
 
 # Approximate cost of a state, seconds of one core for each tag.
 STATE_S_PER_TAG: Final = 1e-5
@@ -49,7 +48,7 @@ class Restored:
 
     run: Run
     known: FoldedState
-    rows: tuple[Scan | Inspection, ...]
+    rows: tuple[Observation, ...]
     last_seq: int
     doubted_ns: int | None = None
 
@@ -199,21 +198,19 @@ def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> li
     tag, then by stamp. `places_only`: tags do not move, but the age of their readings is unknown.
     """
     known = fold(connection, run.root, FOREVER_NS, run.begun_seq)
-    found: dict[str, list[tuple[int, int, Scan | Inspection]]] = {
-        tag.tag_id: [] for tag in known.tags
-    }
+    found: dict[str, list[Observation]] = {tag.tag_id: [] for tag in known.tags}
     if not places_only:
-        for seq, row in listed_rows(connection, run.root, known.scans, known.inspections):
-            found[row.tag_id].append((row.stamp_ns, seq, row))
+        for row in listed_rows(SiteLog(connection), run.root, known.scans, known.inspections):
+            found[row.tag_id].append(row)
     rows: list[Write] = []
     for tag in known.tags:
         placed_ns = known.placed_ns.get(tag.tag_id)
         if tag.pose is not None and placed_ns is not None:
             rows.append(Pin(tag.tag_id, tag.pose, placed_ns, run.begun.arrival_ns))
-        mine = sorted(found[tag.tag_id], key=lambda entry: entry[:2])
+        mine = sorted(found[tag.tag_id], key=lambda row: row.stamp_ns)
         if mine and tag.tag_id not in known.observed:
             # The time since which nothing has been observed there.
             since_ns = tag.last_observed_ns or 0
-            rows.append(replace(mine[0][2], stamp_ns=since_ns, own_stamp_ns=since_ns))
-        rows += [row for *_, row in mine]
+            rows.append(replace(mine[0], stamp_ns=since_ns, own_stamp_ns=since_ns))
+        rows += mine
     return rows

@@ -4,42 +4,46 @@ from __future__ import annotations
 
 import json
 import math
-import sqlite3
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import lru_cache
+from operator import attrgetter
+from sys import intern
 from typing import Any, Final
 
 from lupin_twin.core.drops import valid_text
-from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.past import FOREVER_NS
-from lupin_twin.core.state import STATUS_OK, Bloom, Flower, Inspection, Reading, Scan, Write
+from lupin_twin.core.state import (
+    KIND_FLOWER,
+    NO_FLOWER,
+    STATUS_OK,
+    Bloom,
+    Flower,
+    Observation,
+    Pin,
+    Write,
+)
 from lupin_twin.journal import sql
 from lupin_twin.journal.runs import Run, runs, span_at
-from lupin_twin.journal.schema import LOCAL_SITE, WRITTEN, DamagedFile, SiteLog
+from lupin_twin.journal.schema import WRITTEN, DamagedFile, SiteLog
 
 
 def weight(write: Write) -> int:
     """The size of a write in memory, counted in readings, flowers and footprint points."""
-    if isinstance(write, Scan):
-        return 1 + len(write.readings)
-    if isinstance(write, Inspection) and write.flower is not None:
-        return 1 + len(write.flower.blooms) + len(write.flower.footprint)
-    return 1
+    if isinstance(write, Pin):
+        return 1
+    flower = write.flower or NO_FLOWER
+    return 1 + len(write.values) + len(flower.blooms) + len(flower.footprint)
 
 
 # More than all publishers of a robot latch.
 LATCHED: Final = 1_000
 
 
-def last_rows(connection: sqlite3.Connection, run: Run, most: int) -> list[Scan | Inspection]:
+def last_rows(log: SiteLog, run: Run, most: int) -> list[Observation]:
     """The last scans and inspections that were received in a run, in that order."""
-    query = {"site": LOCAL_SITE, "run": run.id, "since": run.begun_seq, "most": most}
-    found = [
-        *_scans(connection, sql.LAST_SCANS, query),
-        *_inspections(connection, sql.LAST_INSPECTIONS, query),
-    ]
-    return [row for _, row in sorted(found, key=lambda entry: entry[0])[-most:]]
+    query = {"run": run.id, "since": run.begun_seq, "most": most}
+    return observations(log, sql.LAST_SCANS, sql.LAST_INSPECTIONS, query)[-most:]
 
 
 def outermost(
@@ -58,63 +62,63 @@ def last_row(log: SiteLog, upto: int = FOREVER_NS) -> tuple[int, int, int]:
     return max(outermost(log, "DESC", upto, (*WRITTEN, "place")), default=(0, 0, 0))
 
 
-def latest(connection: sqlite3.Connection, tag_id: str, count: int) -> list[Scan | Inspection]:
+def latest(log: SiteLog, tag_id: str, count: int) -> list[Observation]:
     """The last `count` rows of each of a tag's series in the current run, in order of arrival."""
-    span = span_at(runs(connection.execute), FOREVER_NS)
+    span = span_at(runs(log.execute), FOREVER_NS)
     if span is None:
         return []
-    parameters: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run}
-    parameters |= {"tag": tag_id, "depth": count}
-    found = _inspections(connection, sql.LATEST_INSPECTIONS, parameters)
-    for (number,) in connection.execute(sql.SERIES_OF_TAG, parameters).fetchall():
-        found += _scans(connection, sql.LATEST_SCANS, parameters | {"series": number})
-    return [row for _, row in sorted(found, key=lambda entry: entry[0])]
+    query: dict[str, Any] = {"run": span.run, "tag": tag_id, "depth": count}
+    found = inspections_of(log.execute(sql.LATEST_INSPECTIONS, query).fetchall())
+    for (number,) in log.execute(sql.SERIES_OF_TAG, query).fetchall():
+        rows = log.execute(sql.LATEST_SCANS, query | {"series": number})
+        found += scans_of(rows.fetchall())
+    return sorted(found, key=_number_of)
 
 
 # --- rows as they were handed over ----------------------------------------------------------------
 
+_number_of = attrgetter("number")
+
+
+def observations(
+    log: SiteLog, scans: str, inspections: str, query: dict[str, Any]
+) -> list[Observation]:
+    """What two statements find, by number; `sql` has statements with the right columns."""
+    found = [
+        *scans_of(log.execute(scans, query).fetchall()),
+        *inspections_of(log.execute(inspections, query).fetchall()),
+    ]
+    return sorted(found, key=_number_of)
+
 
 def listed_rows(
-    connection: sqlite3.Connection, run: int, scans: Sequence[int], inspections: Sequence[int]
-) -> list[tuple[int, Scan | Inspection]]:
-    """The scans and inspections of a run with these seqs, as (seq, write)."""
-    query = {"site": LOCAL_SITE, "run": run, "scans": json.dumps(scans)}
-    query["looks"] = json.dumps(inspections)
-    return [
-        *_scans(connection, sql.LISTED_SCANS, query),
-        *_inspections(connection, sql.LISTED_INSPECTIONS, query),
-    ]
+    log: SiteLog, run: int, scans: Sequence[int], inspections: Sequence[int]
+) -> list[Observation]:
+    """The scans and inspections of a run with these numbers."""
+    query = {"run": run, "scans": json.dumps(scans), "looks": json.dumps(inspections)}
+    return observations(log, sql.LISTED_SCANS, sql.LISTED_INSPECTIONS, query)
 
 
-def _scans(
-    connection: sqlite3.Connection, select: str, query: dict[str, Any]
-) -> list[tuple[int, Scan | Inspection]]:
-    found: list[tuple[int, Scan | Inspection]] = []
-    rows = connection.execute(select, query).fetchall()
-    every = named_numbers((row[3] for row in rows), [row[4] for row in rows])
+def scans_of(rows: Sequence[Sequence[Any]]) -> list[Observation]:
+    """Rows of `scan`: scans, and attempts of either kind that failed."""
+    every = named_numbers((row[0] for row in rows), [row[1] for row in rows])
+    found = []
     for row, (names, values) in zip(rows, every, strict=True):
-        seq, tag, kind, _, _, stamp_ns, own_ns, arrival_ns, *reported = row
-        status, source, mission, detail = reported
-        sent_ns = stamp_ns if own_ns is None else own_ns
-        reported = (None, status, detail, source, sent_ns, mission, arrival_ns)
-        if kind == KIND_FLOWER:
-            found.append((seq, Inspection(tag, stamp_ns, None, *reported)))
-        else:
-            readings = tuple(map(Reading, names, values))
-            found.append((seq, Scan(tag, stamp_ns, readings, *reported)))
+        _, _, tag, stamp_ns, status, detail, source, own_ns, mission, *of, seq, run = row
+        # Many rows name few tags, sources and missions.
+        tag, source, mission = map(intern, (tag, source, mission))
+        reported = (None, status, detail, source, own_ns, mission, *of, None, seq, run)
+        found.append(Observation(tag, stamp_ns, dict(zip(names, values, strict=True)), *reported))
     return found
 
 
-def _inspections(
-    connection: sqlite3.Connection, select: str, query: dict[str, Any]
-) -> list[tuple[int, Scan | Inspection]]:
-    found: list[tuple[int, Scan | Inspection]] = []
-    for row in connection.execute(select, query).fetchall():
-        seq, tag, stamp_ns, own_ns, arrival_ns, source, mission, *flower = row
-        sent_ns = stamp_ns if own_ns is None else own_ns
-        seen = flower_of(flower)
-        reported = (None, STATUS_OK, "", source, sent_ns, mission, arrival_ns)
-        found.append((seq, Inspection(tag, stamp_ns, seen, *reported)))
+def inspections_of(rows: Iterable[Sequence[Any]]) -> list[Observation]:
+    """Rows of `look`: inspections that saw flowers."""
+    found = []
+    for seq, run, tag, stamp_ns, source, own_ns, mission, arrival_ns, *flower in rows:
+        reported = (STATUS_OK, "", source, own_ns, mission, arrival_ns, KIND_FLOWER)
+        of = (None, *reported, flower_of(flower), seq, run)
+        found.append(Observation(tag, stamp_ns, {}, *of))
     return found
 
 

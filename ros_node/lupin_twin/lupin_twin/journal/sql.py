@@ -97,12 +97,19 @@ def count(rows: str) -> str:
     return f"SELECT count(*) FROM (SELECT stamp_ns {rows} LIMIT :most) AS first"
 
 
-# --- what a `PastWrite` is made of ----------------------------------------------------------------
+# --- what an `Observation` is made of -------------------------------------------------------------
 
-_SCAN: Final = "SELECT r.seq, s.run, s.tag, r.stamp_ns, s.kind, r.status, s.sensors, r.readings"
-_INSPECTION: Final = (
-    "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence, r.anomaly, r.bug_count"
+_SCAN: Final = (
+    "SELECT s.sensors, r.readings, s.tag, r.stamp_ns, r.status, r.detail, r.source,"
+    " coalesce(r.own_stamp_ns, r.stamp_ns), r.mission, r.arrival_ns, s.kind, r.seq, s.run"
 )
+_WHOLE_INSPECTION: Final = (
+    "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.source, coalesce(r.own_stamp_ns, r.stamp_ns),"
+    " r.mission, r.arrival_ns, r.species, r.confidence, r.anomaly, r.flower_count, r.bug_count,"
+    " r.blooms, r.box"
+)
+# Who follows the log does not draw flowers, and some have thousands of numbers.
+_INSPECTION: Final = _WHOLE_INSPECTION.replace("r.blooms, r.box", "'[]', '[]'")
 SCANS_OF_PERIOD: Final = f"{_SCAN} {SCANS.format(tag='')}"
 INSPECTIONS_OF_PERIOD: Final = f"{_INSPECTION} {INSPECTIONS.format(tag='')}"
 _NEXT: Final = "seq > :after AND r.is_copy = 0 ORDER BY seq LIMIT :count"
@@ -148,30 +155,24 @@ RECENT_READINGS: Final = "SELECT s.tag, r.stamp_ns, r.seq, r.readings " + _recen
 
 # --- rows as they were handed over ----------------------------------------------------------------
 
-_WHOLE_SCAN: Final = (
-    "SELECT seq, tag, kind, sensors, readings, stamp_ns, own_stamp_ns, arrival_ns, status,"
-    " source, mission, detail FROM"
-)
-_WHOLE_INSPECTION: Final = (
-    "SELECT seq, tag, stamp_ns, own_stamp_ns, arrival_ns, source, mission, species, confidence,"
-    " anomaly, flower_count, bug_count, blooms, box FROM look AS r WHERE r.site = :site"
-    " AND r.run = :run AND"
-)
 _SCAN_OF_RUN: Final = (
-    f"{_WHOLE_SCAN} scan AS r CROSS JOIN series AS s ON s.site = r.site AND s.series = r.series"
+    f"{_SCAN} FROM scan AS r CROSS JOIN series AS s ON s.site = r.site AND s.series = r.series"
     " WHERE r.site = :site AND s.run = :run AND"
+)
+_INSPECTION_OF_RUN: Final = (
+    f"{_WHOLE_INSPECTION} FROM look AS r WHERE r.site = :site AND r.run = :run AND"
 )
 _LAST: Final = "r.seq >= :since ORDER BY r.seq DESC LIMIT :most"
 LAST_SCANS: Final = f"{_SCAN_OF_RUN} {_LAST}"
-LAST_INSPECTIONS: Final = f"{_WHOLE_INSPECTION} {_LAST}"
+LAST_INSPECTIONS: Final = f"{_INSPECTION_OF_RUN} {_LAST}"
 _LISTED: Final = "r.seq IN (SELECT value FROM json_each({}))"
 LISTED_SCANS: Final = f"{_SCAN_OF_RUN} {_LISTED.format(':scans')}"
-LISTED_INSPECTIONS: Final = f"{_WHOLE_INSPECTION} {_LISTED.format(':looks')}"
+LISTED_INSPECTIONS: Final = f"{_INSPECTION_OF_RUN} {_LISTED.format(':looks')}"
 _NEWEST_FIRST: Final = "ORDER BY r.stamp_ns DESC, r.seq DESC LIMIT :depth"
-LATEST_INSPECTIONS: Final = f"{_WHOLE_INSPECTION} r.tag = :tag {_NEWEST_FIRST}"
+LATEST_INSPECTIONS: Final = f"{_INSPECTION_OF_RUN} r.tag = :tag {_NEWEST_FIRST}"
 # Of one series: it is fast in both databases.
 LATEST_SCANS: Final = (
-    f"{_WHOLE_SCAN} series AS s CROSS JOIN scan AS r WHERE s.site = :site AND s.series = :series"
+    f"{_SCAN} FROM series AS s CROSS JOIN scan AS r WHERE s.site = :site AND s.series = :series"
     f" AND r.site = s.site AND r.series = s.series {_NEWEST_FIRST}"
 )
 SERIES_OF_TAG: Final = "SELECT series FROM series WHERE site = :site AND run = :run AND tag = :tag"

@@ -16,17 +16,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
-from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.past import HOUR_NS, SILENCE_NS, SLOT_NS, Event
 from lupin_twin.core.state import (
+    KIND_FLOWER,
     STATUS_OK,
     Bloom,
     Flower,
-    Inspection,
+    Observation,
     Pin,
     Pose,
-    Reading,
-    Scan,
     Write,
 )
 from lupin_twin.journal.rows import sensor_names
@@ -222,12 +220,9 @@ class Version3:
                 sent_ns = stamp_ns if own_stamp_ns is None else own_stamp_ns
                 arrival_ns = stamp_ns + self._leads[series.run] + 1000 * lag_us
                 of = (sent_ns, self._names[mission], arrival_ns)
-                reported = (None, series.status, detail or "", series.source, *of)
-                if series.kind == KIND_FLOWER:
-                    yield number, series.run, Inspection(series.tag_id, stamp_ns, None, *reported)
-                else:
-                    readings = tuple(map(Reading, series.sensors, values))
-                    yield number, series.run, Scan(series.tag_id, stamp_ns, readings, *reported)
+                reported = (None, series.status, detail or "", series.source, *of, series.kind)
+                named = dict(zip(series.sensors, values, strict=True))
+                yield number, series.run, Observation(series.tag_id, stamp_ns, named, *reported)
             except (_BadRow, KeyError):
                 yield number, 0, None
 
@@ -247,8 +242,8 @@ class Version3:
                 arrival_ns = stamp_ns + self._leads[series.run] + 1000 * lag_us
                 sent_ns = stamp_ns if own_stamp_ns is None else own_stamp_ns
                 of = (sent_ns, self._names[mission], arrival_ns)
-                reported = (None, STATUS_OK, "", series.source, *of)
-                yield number, series.run, Inspection(series.tag_id, stamp_ns, flower, *reported)
+                reported = (None, STATUS_OK, "", series.source, *of, KIND_FLOWER, flower)
+                yield number, series.run, Observation(series.tag_id, stamp_ns, {}, *reported)
             except (_BadRow, KeyError):
                 yield number, 0, None
 

@@ -17,23 +17,21 @@ from concurrent.futures import Future
 from dataclasses import asdict, replace
 from typing import Any, Final
 
-from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import (
     MAX_SCANS,
     RECENT_COUNT,
     NotRemembered,
     PastRow,
-    PastWrite,
     PastWrites,
     RunSpan,
     WritesRequest,
     recent_of,
 )
-from lupin_twin.core.state import STATUS_OK, sure_species
+from lupin_twin.core.state import Observation
 from lupin_twin.journal import sql
 from lupin_twin.journal.counts import deleted_ns
-from lupin_twin.journal.rows import last_row, named_numbers, sensor_names
+from lupin_twin.journal.rows import last_row, named_numbers, observations, scans_of, sensor_names
 from lupin_twin.journal.runs import cut, runs, span_at, spans
 from lupin_twin.journal.schema import SiteLog, one_view
 
@@ -49,16 +47,15 @@ def observed(connection: Any, start_ns: int, end_ns: int) -> PastWrites:
     """
     log = SiteLog(connection)
     axis = spans(runs(log.execute))
-    found: list[PastWrite] = []
+    found: list[Observation] = []
     for span in cut(axis, start_ns, end_ns):
         query = {"run": span.run, "start": span.start_ns, "end": span.end_ns}
-        found += _of_scans(log.execute(sql.SCANS_OF_PERIOD, query).fetchall())
-        found += _of_inspections(log.execute(sql.INSPECTIONS_OF_PERIOD, query).fetchall())
+        found += observations(log, sql.SCANS_OF_PERIOD, sql.INSPECTIONS_OF_PERIOD, query)
     found.sort(key=lambda write: (write.stamp_ns, write.number))
     return PastWrites(log.journal_id, axis, tuple(found), 0, is_all=True)
 
 
-def recent(connection: Any, at_ns: int) -> tuple[PastWrite, ...]:
+def recent(connection: Any, at_ns: int) -> tuple[Observation, ...]:
     """Return the writes that were recent at a moment, ns of ROS time: see `RECENT_COUNT`.
 
     They are scans with readings, and inspections that saw flowers, by stamp and number. They are of
@@ -69,14 +66,12 @@ def recent(connection: Any, at_ns: int) -> tuple[PastWrite, ...]:
     if span is None:
         return ()
     query = {"run": span.run, "start": 0, "end": at_ns + 1, "more": RECENT_COUNT - 1}
-    scans = log.execute(sql.RECENT_SCANS, query).fetchall()
-    inspections = log.execute(sql.RECENT_INSPECTIONS, query).fetchall()
-    return recent_of([*_of_scans(scans), *_of_inspections(inspections)], at_ns)
+    return recent_of(observations(log, sql.RECENT_SCANS, sql.RECENT_INSPECTIONS, query), at_ns)
 
 
 def scans(
     connection: Any, since_ns: int, at_ns: int, sensors: Collection[str]
-) -> tuple[PastWrite, ...]:
+) -> tuple[Observation, ...]:
     """Return the scans with one of `sensors`, from `since_ns` to `at_ns`, both included.
 
     They are of the run that contains `at_ns`, without copies, by stamp and number. If there are
@@ -92,8 +87,8 @@ def scans(
     if len(rows) > MAX_SCANS:
         return ()
     names = frozenset(sensors)
-    wanted = {text: not names.isdisjoint(sensor_names(text)) for text in {row[6] for row in rows}}
-    found = _of_scans([row for row in rows if wanted[row[6]]])
+    wanted = {text: not names.isdisjoint(sensor_names(text)) for text in {row[0] for row in rows}}
+    found = scans_of([row for row in rows if wanted[row[0]]])
     return tuple(sorted(found, key=lambda scan: (scan.stamp_ns, scan.number)))
 
 
@@ -103,11 +98,7 @@ def writes(connection: Any, request: WritesRequest) -> PastWrites:
     newest_seq = last_row(log)[0]
     after = request.after or _beginning(log, request, newest_seq)
     query = {"after": after, "count": request.max_count}
-    scans = log.execute(sql.NEXT_SCANS, query).fetchall()
-    inspections = log.execute(sql.NEXT_INSPECTIONS, query).fetchall()
-    found = sorted(
-        [*_of_scans(scans), *_of_inspections(inspections)], key=lambda write: write.number
-    )
+    found = observations(log, sql.NEXT_SCANS, sql.NEXT_INSPECTIONS, query)
     is_all = len(found) < request.max_count
     found = found[: request.max_count]
     last = max(newest_seq, after) if is_all else found[-1].number
@@ -129,19 +120,6 @@ def _beginning(log: SiteLog, request: WritesRequest, high: int) -> int:
         else:
             low = row[0]
     return low
-
-
-def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
-    every = named_numbers((row[6] for row in rows), [row[7] for row in rows])
-    for row, (names, values) in zip(rows, every, strict=True):
-        seq, run, tag, stamp_ns, kind, status, *_ = row
-        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names, tuple(values))
-
-
-def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
-    for seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count in rows:
-        seen = (sure_species(species, confidence), bool(anomaly), bug_count)
-        yield PastWrite(seq, run, tag, stamp_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
 
 
 # --- an export -----------------------------------------------------------------------------------

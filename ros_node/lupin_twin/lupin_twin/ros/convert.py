@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -28,7 +27,6 @@ from lupin_msgs.msg import (
     DiscoveredTags,
     FlowerObservation,
     FlowerPoint,
-    Observation,
     SensorReading,
     TagReading,
     TagTimes,
@@ -36,21 +34,24 @@ from lupin_msgs.msg import (
     TwinTagState,
     TwinTimes,
 )
+from lupin_msgs.msg import (
+    Observation as ObservationMsg,
+)
 from std_msgs.msg import Header
 
 from lupin_twin.core.diagnostics import STATE_TOPIC, Finding
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, kind_of
-from lupin_twin.core.ingest import Received, ReceivedTags, scanned_pose
+from lupin_twin.core.ingest import ReceivedTags, scanned_pose
 from lupin_twin.core.state import (
+    KIND_FLOWER,
+    KIND_TAG_READING,
     NANOSECONDS_PER_SECOND,
     NO_FLOWER,
     Attempt,
     Bloom,
     Flower,
-    Inspection,
+    Observation,
     Pose,
     Reading,
-    Scan,
     Snapshot,
     TagState,
     same_tags,
@@ -148,29 +149,35 @@ def pose_of(pose: Any) -> Pose:
     )
 
 
-def received(msg: Any) -> Received:
-    """lupin_msgs/Observation as it was sent; a flower's pose counts in its own frame, if any."""
+def received(msg: Any) -> tuple[str, Observation]:
+    """The frame and the content of lupin_msgs/Observation, as sent.
+
+    A flower's pose counts in its own frame, if it has one.
+    """
     frame_id, pose = msg.header.frame_id, msg.tag_pose_in_map
-    sent: Scan | Inspection | None = None
+    tag_id, stamp_ns, flower = "", 0, None
+    values: dict[str, float] = {}
     if msg.kind == KIND_TAG_READING:
         reading = msg.tag_reading
-        readings = tuple(Reading(r.name, float(r.value)) for r in reading.readings)
-        sent = Scan(reading.tag_id, nanoseconds(reading.stamp), readings)
+        tag_id, stamp_ns = reading.tag_id, nanoseconds(reading.stamp)
+        values = {each.name: float(each.value) for each in reading.readings}
     elif msg.kind == KIND_FLOWER:
-        flower = msg.flower
-        frame_id, pose = flower.pose.header.frame_id or frame_id, flower.pose.pose
-        sent = Inspection(flower.tag_id, 0, _flower(flower, shortest(flower.confidence)))
-    if sent is not None:
-        sent = replace(
-            sent,
-            pose=pose_of(pose),
-            status=int(msg.status),
-            status_detail=msg.status_detail,
-            source=msg.source,
-            own_stamp_ns=nanoseconds(msg.header.stamp),
-            mission=msg.mission_id,
-        )
-    return Received(int(msg.kind), frame_id, sent)
+        seen = msg.flower
+        tag_id, flower = seen.tag_id, _flower(seen, shortest(seen.confidence))
+        frame_id, pose = seen.pose.header.frame_id or frame_id, seen.pose.pose
+    return frame_id, Observation(
+        tag_id,
+        stamp_ns,
+        values,
+        pose_of(pose),
+        int(msg.status),
+        msg.status_detail,
+        msg.source,
+        nanoseconds(msg.header.stamp),
+        msg.mission_id,
+        kind=int(msg.kind),
+        flower=flower,
+    )
 
 
 def received_tags(msg: Any) -> ReceivedTags:
@@ -282,22 +289,24 @@ def _moment(stamp: Any) -> int | None:
 # --- what goes out --------------------------------------------------------------------------
 
 
-def observation_message(write: Scan | Inspection, frame_id: str) -> Any:
+def observation_message(write: Observation, frame_id: str) -> Any:
     """A scan, an inspection, or an attempt that failed, as lupin_msgs/Observation."""
     header = Header(stamp=time_msg(write.stamp_ns), frame_id=frame_id)
     pose = pose_message(write.pose)
-    message = Observation(
+    message = ObservationMsg(
         header=header,
         mission_id=write.mission,
         source=write.source,
-        kind=kind_of(write),
+        kind=write.kind,
         status=int(write.status),
         status_detail=write.status_detail,
         tag_pose_in_map=pose,
     )
-    if isinstance(write, Scan):
+    if write.kind == KIND_TAG_READING:
         message.tag_reading = TagReading(
-            tag_id=write.tag_id, stamp=header.stamp, readings=_readings_message(write.readings)
+            tag_id=write.tag_id,
+            stamp=header.stamp,
+            readings=_readings_message(write.values.items()),
         )
     else:
         flower = write.flower or NO_FLOWER
@@ -318,8 +327,8 @@ def discovered_tags_message(places: Mapping[str, Pose], header: Any) -> Any:
     return DiscoveredTags(header=header, tags=list(tags))
 
 
-def _readings_message(readings: Iterable[Reading]) -> list[Any]:
-    return [SensorReading(name=r.name, value=float(r.value)) for r in readings]
+def _readings_message(readings: Iterable[tuple[str, float]]) -> list[Any]:
+    return [SensorReading(name=name, value=float(number)) for name, number in readings]
 
 
 class StateMessages:
@@ -376,7 +385,7 @@ def tag_message(tag: TagState) -> Any:
     return TwinTagState(
         tag_id=tag.tag_id,
         pose=pose_message(tag.pose),
-        readings=_readings_message(tag.readings),
+        readings=_readings_message((r.name, r.value) for r in tag.readings),
         last_observed=time_msg(tag.last_observed_ns or 0),
         species_confidence=float(tag.flower.confidence),
         **flower_fields(tag.flower),

@@ -20,9 +20,8 @@ from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
 from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
 from lupin_twin.core.drops import Drop
-from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
-from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
+from lupin_twin.core.state import ClockState, Observation, Snapshot, TwinStore, Write
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.paths import journal_path
@@ -191,7 +190,8 @@ class TwinNode(AdjustableNode):
 
     def _on_observation(self, msg: Any) -> None:
         topic = self._topics["observations_topic"]
-        write = ingest.observation(convert.received(msg), self.parameters.frame_id, self.now_ns())
+        frame_id = self.parameters.frame_id
+        write = ingest.observation(*convert.received(msg), frame_id, self.now_ns())
         if isinstance(write, Drop):
             self.utilities.drop(write, topic)
             return
@@ -202,10 +202,10 @@ class TwinNode(AdjustableNode):
                 self._check_lateness(write, topic)
             self.notify_listener()
 
-    def _check_lateness(self, write: Scan | Inspection, topic: str) -> None:
+    def _check_lateness(self, write: Observation, topic: str) -> None:
         late = self.lateness.see(
             write.source,
-            kind_of(write),
+            write.kind,
             write.stamp_ns,
             was_latched=self.utilities.published_ago_s > LATCHED_AFTER_S,
             now_s=time.monotonic(),

@@ -26,7 +26,7 @@ from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
-from lupin_bridge.stream.hub import Client, Hub
+from lupin_bridge.stream.hub import Hub
 from lupin_bridge.stream.pollers import EstimatePoller, RobotPoller
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
@@ -196,15 +196,6 @@ class Bridge:
             holds_ns=self.judge.holds_ns(),
             now_ns=self.ros_time_ns,
         )
-
-    def join(self, client: Client) -> None:
-        """Add a client; it has been sent the status and the current state when this returns."""
-        self._publish_status()  # the other clients get a change no later
-        self.hub.join(client, self._clock())
-
-    def serve(self, client: Client) -> None:
-        """Send a client what it lacks: its socket is free again."""
-        self.hub.serve(client, self._clock())
 
     def note_answer(self, path: str, status: int, seconds: float) -> None:
         """Count an HTTP answer, which has begun."""

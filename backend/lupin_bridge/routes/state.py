@@ -81,7 +81,7 @@ async def ws_state(websocket: WebSocket) -> None:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
         return
-    await listen(websocket, bridge, delta=query.delta, min_interval_s=query.min_interval_s)
+    await listen(websocket, bridge.hub, delta=query.delta, min_interval_s=query.min_interval_s)
 
 
 @read_route(

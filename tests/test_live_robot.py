@@ -24,7 +24,7 @@ from tests.support.web import Bridge, Listener, bridge
 QUICK = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
 # No machine is too busy for an answer.
 PATIENT = limits(answer_timeout_s=PATIENCE_S)
-OFTEN = constants(**{"lupin_bridge.stream.pollers:ROBOT_PERIOD_S": 0.1})
+OFTEN = constants(**{"lupin_bridge.bridge:ROBOT_PERIOD_S": 0.1})
 Json = dict[str, Any]
 
 

@@ -10,30 +10,31 @@ import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator
-from typing import Final
+from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
+from typing import Any, Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
-from lupin_bridge.feed.source import TwinSource, TwinUpdate
+from lupin_bridge.feed.source import RobotLog, TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, Periodic, Shared, end
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, silenced, unjudged
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
-from lupin_bridge.past.fields import Reports
-from lupin_bridge.past.plans import Answered
-from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
+from lupin_bridge.past.fields import Reports, all_changed
+from lupin_bridge.serving.admission import Admission, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
-from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.pollers import EstimatePoller, RobotPoller
+from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message, text_frame
+from lupin_bridge.stream.hub import Hub
+from lupin_bridge.stream.state_json import robot_message
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Reason
+from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.runtime.estimates import Report
+from lupin_twin.field.engine import FieldRefused
+from lupin_twin.runtime.estimates import Report, sensors_of
 
 log = logging.getLogger(__name__)
 
@@ -54,6 +55,11 @@ PACE_BURST: Final = 2.0
 ALARMS_S: Final = 0.03
 ALARMS_REST_S: Final = 1.0
 ALARM_BYTES_PER_S: Final = 500_000
+# Reports on estimates: the pause between two rounds, which take at most a tenth of a core.
+GRADING_PERIOD_S: Final = 15.0
+GRADING_REST: Final = 9.0
+# Interval of polling the robot's topics: its frames come no more often.
+ROBOT_PERIOD_S: Final = 1.0
 
 
 class Bridge:
@@ -83,8 +89,7 @@ class Bridge:
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache
-        self.answering: Shared[Answer] = Shared()
-        self.looking_back: Shared[Answered] = Shared()
+        self.answering: Shared[Any] = Shared()
         self.criteria = criteria or Criteria.of(settings)
         self.frames = FrameWriter(self.criteria.sensors.by_name)
         self.offer = Offer(source)
@@ -93,16 +98,14 @@ class Bridge:
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False
-        self.estimates = EstimatePoller(
-            self._report_on,
-            lambda: None if self.latest is None else self.latest.snapshot,
-            self.judge.note_changed,
-        )
+        self._reports: Mapping[str, Report] = {}
+        self._grading = Periodic(self._grade, GRADING_PERIOD_S, "what estimates are worth")
         self.alarms = AlarmBoard(self._on_alarms)
         self.alarm_feed = AlarmFeed(
             source, self.judge, self.alarms, lambda: self.ros_time_ns, limits.alarm_days
         )
-        self.robot = RobotPoller(source, self.hub, lambda: self.ros_time_ns, clock)
+        self.robot = RobotLog()
+        self._robot_look = Periodic(self._look_at_robot, ROBOT_PERIOD_S, "the look at the robot")
         self._has_alarms = asyncio.Event()
         self.notes = NoteBoard(source, self._has_alarms.set)
         self.takes_observations = settings.http_observations == "on" and source.takes_observations
@@ -137,15 +140,15 @@ class Bridge:
         if self.latest is not None:  # there may be no second state: a silent site sends one
             self.notes.start()
         self.alarm_feed.start()
-        self.estimates.start()
-        self.robot.start()
+        self._grading.start()
+        self._robot_look.start()
 
     async def stop(self) -> None:
         """Stop all that `start` began; call `announce_shutdown` first to notify the clients."""
         await end(self._learning, self._publishing_alarms)
         await self._watch.stop()
         await asyncio.gather(self.alarm_feed.stop(), self.notes.stop())
-        await asyncio.gather(self.estimates.stop(), self.robot.stop())
+        await asyncio.gather(self._grading.stop(), self._robot_look.stop())
         if self._push_timer is not None:
             self._push_timer.cancel()
         await asyncio.gather(self.outward.stop(), self.source.stop())
@@ -196,15 +199,6 @@ class Bridge:
             holds_ns=self.judge.holds_ns(),
             now_ns=self.ros_time_ns,
         )
-
-    def join(self, client: Client) -> None:
-        """Add a client; it has been sent the status and the current state when this returns."""
-        self._publish_status()  # the other clients get a change no later
-        self.hub.join(client, self._clock())
-
-    def serve(self, client: Client) -> None:
-        """Send a client what it lacks: its socket is free again."""
-        self.hub.serve(client, self._clock())
 
     def note_answer(self, path: str, status: int, seconds: float) -> None:
         """Count an HTTP answer, which has begun."""
@@ -319,6 +313,26 @@ class Bridge:
         wanted = Reports(sensor, None, now_ns, day_s, self.criteria.sensors)
         return (await self.source.ask(wanted, wanted.cost_s(len(snapshot.tags))))[sensor]
 
+    async def _grade(self) -> None:
+        """Pass on to the judge which sensors have changed, by the reports on all estimates."""
+        if self.latest is None:
+            return
+        begun_s = time.monotonic()
+        snapshot = self.latest.snapshot
+        self._reports = await current_reports(snapshot, self._report_on, self._reports)
+        self.judge.note_changed(all_changed(self._reports))
+        await asyncio.sleep(GRADING_REST * (time.monotonic() - begun_s))
+
+    async def _look_at_robot(self) -> None:
+        now_ns = self.ros_time_ns
+        try:
+            reported = await self.source.robot(now_ns)
+        except TwinUnavailableError:  # the ROS thread has ended, which the status reports
+            return
+        if reported is not None and self.robot.take(reported, now_ns):
+            wire = text_frame(robot_message(self.robot))
+            self.hub.publish_beside("robot", wire, self._clock())
+
     def _judge_state(self, snapshot: Snapshot) -> Judged:
         try:
             judged = self.judge.see(snapshot)
@@ -394,3 +408,19 @@ class Bridge:
         self.hub.serve_all(now_s)  # clients with a low rate may be due by now
         if stuck := self.hub.dismiss_stuck(now_s):
             log.warning("disconnected %d clients that accepted no frame", stuck)
+
+
+async def current_reports(
+    snapshot: Snapshot,
+    report_on: Callable[[str, Snapshot], Awaitable[Report]],
+    known: Mapping[str, Report],
+) -> dict[str, Report]:
+    """The report on each sensor, one after the other; where one fails, the `known` one holds."""
+    reports: dict[str, Report] = {}
+    for name in sensors_of(snapshot):
+        try:
+            reports[name] = await report_on(name, snapshot)
+        except (FieldRefused, NotRemembered, PastRefused, TwinUnavailableError):
+            if name in known:
+                reports[name] = known[name]
+    return reports

@@ -96,12 +96,12 @@ class Stage:
     """A bridge between a scripted source and a connection."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, **limits: Any) -> None:
-        self.script, self.ear = Script(), Ear()
+        self.script, self.ear, self.clock = Script(), Ear(), clock
         self.bridge = Bridge(self.script, Settings(), clock, limits=Limits(**limits))  # type: ignore[arg-type]
 
     async def __aenter__(self) -> Self:
         await self.bridge.start()
-        self.bridge.join(Client(self.ear))
+        self.bridge.hub.join(Client(self.ear), self.clock())
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -248,7 +248,7 @@ async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_ha
     async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
         stage.bridge.liveness.stale_after_s = math.inf  # no status carries it along
         rare = Ear()
-        stage.bridge.join(Client(rare, min_interval_s=0.3))
+        stage.bridge.hub.join(Client(rare, min_interval_s=0.3), stage.clock())
         for number in range(1, 6):
             stage.script.tell(state(number))
         now_s += 0.1
@@ -415,7 +415,7 @@ async def test_a_state_that_cannot_be_judged_is_sent_with_everything_unknown(
 
     delta = Ear()
     async with Stage(frames_per_s=1000.0) as stage:
-        stage.bridge.join(Client(delta, delta=True))
+        stage.bridge.hub.join(Client(delta, delta=True), stage.clock())
         for number, is_broken in enumerate((False, True, True, False), start=1):
             stage.script.tell(judged_state(number))
             await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023

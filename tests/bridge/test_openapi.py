@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 
 from lupin_bridge.app import document
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.pollers import GetEstimateResponse
+from lupin_bridge.stream.estimate_schema import GetEstimateResponse
 
 DOCUMENT: dict[str, Any] = json.loads(document())
 

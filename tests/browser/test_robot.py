@@ -22,7 +22,7 @@ from tests.support.web import Bridge, bridge
 
 @pytest.fixture
 def robot() -> Iterator[Bridge]:
-    often = constants(**{"lupin_bridge.stream.pollers:ROBOT_PERIOD_S": 0.1})
+    often = constants(**{"lupin_bridge.bridge:ROBOT_PERIOD_S": 0.1})
     with bridge(*often, *OFTEN) as running:
         for tag_id, at in (("a", (0.0, 0.0)), ("b", (4.0, 0.0)), ("c", (4.0, 3.0))):
             running.peer.observe(scan(tag_id, {"temperature": 21.0}, at))

@@ -10,7 +10,7 @@ from typing import Any
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_twin.core.diagnostics import Condition, Origin
+from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import DAY_S, World
 from lupin_twin.core.past import NotRemembered
@@ -68,10 +68,6 @@ class LocalTwin(RosSource[TwinNode]):
     def world(self) -> World:
         """See `TwinSource`."""
         return World(self._origin, self._day_length_s)
-
-    def journal(self) -> Condition:
-        """The node's journal."""
-        return self.update.journal
 
     writes_notes = True
 

@@ -22,8 +22,6 @@ from lupin_twin.core.past import NotRemembered
 
 log = logging.getLogger(__name__)
 
-# Queries under way at most.
-MAX_PENDING: Final = 100
 # Pause after the death of a process, s.
 REST_S: Final = 2.0
 # How long a process may take to react to a cancellation, s; on a busy machine it may just start.
@@ -65,14 +63,12 @@ class PastProcess:
         """Answer a query; `cost_s` is its estimated cost, s of one core.
 
         Raises:
-            NotRemembered: the process has died, or too many queries are under way.
+            NotRemembered: the process has died.
             Exception: whatever the query raised there.
 
         """
         if self.why_down:
             raise NotRemembered(self.why_down)
-        if len(self.pending) >= MAX_PENDING:
-            raise NotRemembered(f"{MAX_PENDING} requests about the past are under way, the limit")
         # Packed twice: what cannot be unpacked there is the error of this query alone.
         packed = pickle.dumps((query, now, cost_s), 5)
         number = next(self._numbers)

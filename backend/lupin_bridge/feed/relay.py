@@ -28,7 +28,6 @@ import re
 import sys
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -160,7 +159,7 @@ class Relay:
         # loop or a slow client had taken them.
         self.sent = self.skipped = 0
         self.topics: dict[Topic, _Relayed] = {}
-        self._closing: set[asyncio.Task[None]] = set()
+        self._ending: set[asyncio.Task[None]] = set()
 
     async def listen(self, topic: Topic, on_sample: Callable[[Sample], None]) -> Callable[[], None]:
         """Listen to a topic, whoever publishes it; returns a function that ends this, idempotent.
@@ -178,11 +177,12 @@ class Relay:
             on_sample(sample)
         relayed.listeners.append(on_sample)
         close = partial(self._leave, relayed, on_sample)
-        with ExitStack() as undo:
-            undo.callback(close)
+        try:
             # Shielded from the first listener's cancellation: others may wait for it by now.
             await asyncio.shield(relayed.opening)
-            undo.pop_all()
+        except BaseException:
+            close()
+            raise
         return close
 
     def renew(self) -> None:
@@ -213,7 +213,8 @@ class Relay:
 
     def _open(self, relayed: _Relayed) -> None:
         relayed.opening = asyncio.create_task(self._subscribe(relayed))
-        relayed.opening.add_done_callback(partial(self._opened, relayed))
+        # Retrieve the exception, in case all listeners have left.
+        relayed.opening.add_done_callback(lambda it: it.cancelled() or it.exception())
 
     async def _subscribe(self, relayed: _Relayed) -> Callable[[], None]:
         topic, thread = relayed.topic, self._thread()
@@ -229,14 +230,12 @@ class Relay:
             close: Callable[[], None] = await thread.call(
                 lambda node: self._ros.subscribe(node, topic, take)
             )
-        except ValueError as error:
-            raise NotRelayedError(f"{topic.name} cannot be relayed here: {error}") from None
-        return close
-
-    def _opened(self, relayed: _Relayed, task: asyncio.Task[Callable[[], None]]) -> None:
-        # Retrieve the exception, in case all listeners have left.
-        if task.cancelled() or task.exception() is not None:
+        except BaseException as error:
             self._forget(relayed)
+            if isinstance(error, ValueError):
+                raise NotRelayedError(f"{topic.name} cannot be relayed here: {error}") from None
+            raise
+        return close
 
     def _forget(self, relayed: _Relayed) -> None:
         if self.topics.get(relayed.topic) is relayed:
@@ -246,17 +245,15 @@ class Relay:
         if on_sample in relayed.listeners:
             relayed.listeners.remove(on_sample)
             if not relayed.listeners:
-                asyncio.get_running_loop().call_later(self.linger_s, self._end, relayed)
+                ending = asyncio.create_task(self._end(relayed))
+                self._ending.add(ending)
+                ending.add_done_callback(self._ending.discard)
 
-    def _end(self, relayed: _Relayed) -> None:
+    async def _end(self, relayed: _Relayed) -> None:
+        await asyncio.sleep(self.linger_s)
         if relayed.listeners or self.topics.get(relayed.topic) is not relayed:
             return  # somebody listens again, or it has ended
         self._forget(relayed)
-        task = asyncio.create_task(self._unsubscribe(relayed))
-        self._closing.add(task)
-        task.add_done_callback(self._closing.discard)
-
-    async def _unsubscribe(self, relayed: _Relayed) -> None:
         try:
             close = await relayed.opening
             await self._thread().call(lambda _: close())

@@ -258,9 +258,9 @@ class TwinSource(ABC):
         """
         return "" if self.update is None else self.update.revision
 
-    @abstractmethod
     def journal(self) -> Condition:
         """The condition of the twin's journal, as far as it is reported."""
+        return UNKNOWN_JOURNAL if self.update is None else self.update.journal
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""

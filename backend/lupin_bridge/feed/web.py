@@ -31,7 +31,6 @@ from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused
-from lupin_twin.core.state import Snapshot
 from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
 from lupin_twin.journal.paths import journal_path
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error
@@ -279,38 +278,8 @@ class WebTwin(RosSource[WebNode]):
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
         def make_node(context: Any, post: Post) -> WebNode:
-            update = self.update
-
-            def pass_on(snapshot: Snapshot) -> None:
-                nonlocal update
-                report = node.self_report
-                update = TwinUpdate(
-                    snapshot,
-                    node.revision,
-                    node.utilities.twins,
-                    node.occupancy_map,
-                    report.counts,
-                    node.utilities.counts(),
-                    journal=report.journal,
-                    rules=node.rules,
-                    origin=report.origin,
-                    input_problems=report.input_problems,
-                )
-                post(update)
-
-            def renew() -> None:
-                nonlocal update
-                if update is not None:
-                    update = replace(
-                        update,
-                        revision=node.revision,
-                        occupancy_map=node.occupancy_map,
-                        rules=node.rules,
-                    )
-                    post(update)
-
-            node = WebNode(pass_on, renew, context=context)
-            # Like `update`, what the old node knew stays valid in the new one.
+            node = WebNode(post, context=context)
+            # What the old node knew stays valid in the new one.
             if self._node is not None:
                 node.take_over(self._node)
             self._node = node
@@ -362,9 +331,7 @@ class WebTwin(RosSource[WebNode]):
 
     def journal(self) -> Condition:
         """The condition of the log that is read here; until there is one, as on `/diagnostics`."""
-        return self._log.condition or (
-            UNKNOWN_JOURNAL if self.update is None else self.update.journal
-        )
+        return self._log.condition or super().journal()
 
     async def now(self) -> Now:
         """See `TwinSource`."""

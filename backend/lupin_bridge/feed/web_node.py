@@ -13,11 +13,12 @@ from lupin_msgs.srv import GetWrites
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.validate_topic_name import validate_topic_name
 
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_twin.core import interfaces
 from lupin_twin.core.clock import reported_clock
 from lupin_twin.core.diagnostics import SelfReport, self_report
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import TagState
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap, digest_of
 from lupin_twin.ros import convert, message_limits
@@ -60,9 +61,9 @@ class WebNode(AdjustableNode):
     All nodes of a domain share `/diagnostics`: it takes only the report of the twin that publishes
     this state.
 
-    `on_state(snapshot)` is called for each state, once its times are there or the next state is.
-    Unchanged tags are the same objects as in the snapshot before. `on_map()` is called when the map
-    or a parameter of this node has changed.
+    `post(update)` is called for each state, once its times or the next state are there. Unchanged
+    tags are the same objects as in the snapshot before. It is also called when the map or a
+    parameter of this node has changed, which is no sign of life of the twin.
 
     Raises:
         lupin_twin.core.parameters.ParameterError: a parameter out of its range.
@@ -71,8 +72,7 @@ class WebNode(AdjustableNode):
 
     def __init__(
         self,
-        on_state: Callable[[Snapshot], None],
-        on_map: Callable[[], None] = lambda: None,
+        post: Callable[[TwinUpdate], None],
         *,
         context: Any = None,
     ) -> None:
@@ -85,9 +85,8 @@ class WebNode(AdjustableNode):
         self.digest = ""
         self.publishers_digest = ""
         self._changes = 0
-        self._on_state = on_state
-        self._on_map = on_map
-        self._newest: Snapshot | None = None
+        self._post = post
+        self.update: TwinUpdate | None = None
         # When the newest state was published.
         self._published_ns = 0
         # The newest message of each, not yet shown; they belong together if their stamps are equal.
@@ -131,7 +130,7 @@ class WebNode(AdjustableNode):
 
     def take_over(self, before: WebNode) -> None:
         """Take over the state of the node that this one replaces."""
-        self.occupancy_map = before.occupancy_map
+        self.occupancy_map, self.update = before.occupancy_map, before.update
         self.digest, self.publishers_digest = before.digest, before.publishers_digest
         self._published_ns = before._published_ns
         differ = [
@@ -204,25 +203,45 @@ class WebNode(AdjustableNode):
         ids = sorted(bytes(it.endpoint_gid) for it in self.get_publishers_info_by_topic(topic))
         self.publishers_digest = blake2b(b"".join(ids), digest_size=6).hexdigest()
         self.utilities.check_twins(topic, "what is shown is a mixture")
-        before = self._newest
+        before = None if self.update is None else self.update.snapshot
+        report = self.self_report
         snapshot = convert.snapshot_of(msg, before, times)
         clock = reported_clock(
-            self.self_report.clock,
+            report.clock,
             snapshot.stamp_ns,
             ages_are_known=not any(math.isnan(tag.stale_seconds) for tag in msg.tags),
         )
-        snapshot = replace(snapshot, clock=clock)
-        self._newest = snapshot
         self.digest = _digest_of(snapshot.tags)
-        self._on_state(snapshot)
+        self.update = TwinUpdate(
+            replace(snapshot, clock=clock),
+            self.revision,
+            self.utilities.twins,
+            self.occupancy_map,
+            report.counts,
+            self.utilities.counts(),
+            journal=report.journal,
+            rules=self.rules,
+            origin=report.origin,
+            input_problems=report.input_problems,
+        )
+        self._post(self.update)
+
+    def _renew(self) -> None:
+        if self.update is not None:
+            self.update = replace(
+                self.update,
+                revision=self.revision,
+                occupancy_map=self.occupancy_map,
+                rules=self.rules,
+            )
+            self._post(self.update)
 
     def _take_map(self, msg: Any) -> None:
-        # Reported with the next state: a map is no sign of life of the twin.
         topic, frame_id = self._topics["map_topic"], self.parameters.frame_id
         new = self.utilities.new_map(msg, topic, frame_id, self.occupancy_map)
         if new is not None:
             self.occupancy_map = replace(new, revision=digest_of(new))
-            self._on_map()
+            self._renew()
 
     def _take_diagnostics(self, msg: Any) -> None:
         # Reported with the next state, like the map: without a state there is no twin to show.
@@ -235,7 +254,7 @@ class WebNode(AdjustableNode):
         """See `AdjustableNode`. The twin's parameters are not on the wire: set them here too."""
         self.rules = FieldRules.of(now)
         self._changes += 1
-        self._on_map()
+        self._renew()
 
 
 def _digest_of(tags: Sequence[TagState]) -> str:

@@ -77,7 +77,7 @@ from lupin_bridge.serving.admission import (
 )
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import Status
-from lupin_bridge.stream.hub import Client, Hub
+from lupin_bridge.stream.hub import Hub
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.past import seconds
 from lupin_twin.journal.writes import STRETCH_S, Export
@@ -170,14 +170,6 @@ class Fleet:
         if person is None or not person.sites:
             return sites
         return {name: site for name, site in sites.items() if person.reads(name)}
-
-    def join(self, client: Client) -> None:
-        """Add a browser; it has been sent every site when this returns."""
-        self.hub.join(client, time.monotonic())
-
-    def serve(self, client: Client) -> None:
-        """Send a browser what it lacks: its socket is free again."""
-        self.hub.serve(client, time.monotonic())
 
     async def _push(self) -> None:
         now_s, watching, last = time.monotonic(), self.watching, self._frame
@@ -336,10 +328,9 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         only = () if person is None else person.sites
         await listen(
             websocket,
-            fleet,
+            fleet.hub,
             delta=True,
-            wants_status=False,
-            wants_alarms=False,
+            wants=("state",),
             wire=lambda it, frame: cast("SitesFrame", frame).wire(it.sent_seq, only),
         )
 

@@ -45,6 +45,7 @@ from lupin_twin.runtime.estimates import (
     REPORT_S,
     Report,
     ReportRequest,
+    changed_of,
     estimate_at,
     report_of,
     sensors_of,
@@ -289,14 +290,14 @@ def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list
 
 
 def quality(reports: Mapping[str, Report]) -> bytes:
-    """`pollers.EstimateQualities`."""
+    """`estimate_schema.EstimateQualities`."""
     return orjson.dumps(
         {"sensors": {name: _estimate_quality(one) for name, one in reports.items()}}
     )
 
 
 def tags(reports: Mapping[str, Report]) -> bytes:
-    """`pollers.ExpectedTags` of the one report."""
+    """`estimate_schema.ExpectedTags` of the one report."""
     [(sensor_type, report)] = reports.items()
     found = {
         tag.tag_id: {
@@ -314,7 +315,7 @@ def tags(reports: Mapping[str, Report]) -> bytes:
 
 
 def advice(reports: Mapping[str, Report]) -> bytes:
-    """`pollers.Advice` of the one report."""
+    """`estimate_schema.Advice` of the one report."""
     [(sensor_type, report)] = reports.items()
     return orjson.dumps({"sensor_type": sensor_type, "places": report.places})
 
@@ -399,3 +400,12 @@ class Reports:
 
 # What a report is made of: its moment, and the plausible readings of `REPORT_DAYS`.
 _OfSensor = tuple[ReportRequest, int, list[TagPast]]
+
+
+def all_changed(reports: Mapping[str, Report]) -> dict[str, dict[str, int]]:
+    """By tag and sensor: since when a sensor has changed, and estimates leave it out, ns."""
+    changed: dict[str, dict[str, int]] = {}
+    for sensor, report in reports.items():
+        for tag_id, since_ns in changed_of(report.tags).items():
+            changed.setdefault(tag_id, {})[sensor] = since_ns
+    return changed

@@ -275,21 +275,18 @@ async def respond(
     bridge = bridge_of(request)
     if etag is not None and has_etag(request, etag):
         return not_modified(etag)
-    response = cached(bridge, etag or key) or await admitted(
-        request, lambda: bridge.answering.get(key, compute)
-    )
+    lent = bridge.cache.lend(etag or key)
+    response: Response
+    if lent is not None:
+        response = CachedResponse(*lent)
+    else:
+        response = await admitted(request, lambda: bridge.answering.get(key, compute))
     found = response.headers.get("etag")
     if found is not None and response.status_code == 200 and has_etag(request, found):
         if isinstance(response, CachedResponse):
             response.release()
         return not_modified(found)
     return response
-
-
-def cached(bridge: Bridge, key: Hashable) -> CachedResponse | None:
-    """The answer in the cache; None: there is none."""
-    lent = bridge.cache.lend(key)
-    return None if lent is None else CachedResponse(*lent)
 
 
 async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Response]]) -> Response:
@@ -401,9 +398,13 @@ async def respond_as_of(request: Request, query: StateQuery) -> Response:
         Exception: what the source or the query raised.
 
     """
+    journal, at_ns = bridge_of(request).source.journal(), query.at_ns or 0
     # As of before the answer. In headers, as the body stays the same when older rows are deleted.
-    headers = bodies.moment_headers(bridge_of(request).source.journal(), query.at_ns or 0)
-    response = await respond_past(request, query, "state")
+    headers = bodies.moment_headers(journal, at_ns)
+    try:
+        response = await respond_past(request, query, "state")
+    except NotFound as error:
+        response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
     response.headers.update(headers)
     return response
 
@@ -419,31 +420,19 @@ async def respond_past(request: Request, query: Query, kind: str) -> Response:
     bridge = bridge_of(request)
     header = list_header(request, "if-none-match")
 
-    async def ask(has: str) -> Answered:
+    async def ask() -> Answered:
         tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
         cost_s = query.cost_s(tags)
         with (
             bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S) as times,
             bridge.metrics.past_seconds.labels(kind).time(),
         ):
-            found = await bridge.source.ask(partial(answered, query, has), cost_s * times)
-        if found.answer is not None:
-            bridge.cache.put(found.etag, found.answer)
-        return found
+            return await bridge.source.ask(partial(answered, query, header), cost_s * times)
 
     async def work() -> Answer | Response:
-        # The other process does not write an answer that is cached here. If the cache drops it
-        # meanwhile, the query is repeated.
-        while True:
-            has = ", ".join((header, *bridge.cache.newest_tags()))
-            key = (kind, query, header, bridge.state_number)
-            found = await bridge.looking_back.get(key, lambda has=has: ask(has))  # type: ignore[misc]
-            if has_etag(request, found.etag):
-                return not_modified(found.etag)
-            response = cached(bridge, found.etag)
-            if response is not None:
-                return response
-            if found.answer is not None:
-                return found.answer
+        # The log grows: an equal query later is another one.
+        key = (kind, query, header, bridge.state_number)
+        found: Answered = await bridge.answering.get(key, ask)
+        return found.answer or not_modified(found.etag)
 
     return await admitted(request, work)

@@ -38,7 +38,7 @@ from lupin_bridge.routes.answers import (
     respond_past,
 )
 from lupin_bridge.serving.admission import Answer, ClientLimitError
-from lupin_bridge.stream import pollers, routes_schema, schema
+from lupin_bridge.stream import estimate_schema, routes_schema, schema
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report
@@ -208,7 +208,7 @@ ESTIMATE: Final = InFormats(
 It uses the journal up to a moment, for the model too. Without `at`, that moment is the newest
 reading or the last whole minute, whichever is later; the ETag changes with it.""",
     parameters=parameters_of(EstimateQuery),
-    model=pollers.GetEstimateResponse,
+    model=estimate_schema.GetEstimateResponse,
 )
 
 
@@ -266,7 +266,7 @@ class AdviceQuery(TagsQuery):
     router,
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
-    responses={**NOT_REMEMBERED, 200: {"model": pollers.EstimateQualities}},
+    responses={**NOT_REMEMBERED, 200: {"model": estimate_schema.EstimateQualities}},
     query=QualityQuery,
 )
 async def quality(request: Request) -> Response:
@@ -284,7 +284,7 @@ async def quality(request: Request) -> Response:
     router,
     "/api/estimate/tags",
     summary="The expected value of each tag's newest reading, and which tags have changed",
-    responses={**NOT_REMEMBERED, 200: {"model": pollers.ExpectedTags}},
+    responses={**NOT_REMEMBERED, 200: {"model": estimate_schema.ExpectedTags}},
     query=TagsQuery,
 )
 async def tags(request: Request) -> Response:
@@ -297,7 +297,7 @@ async def tags(request: Request) -> Response:
     router,
     "/api/estimate/advice",
     summary="Where an additional tag would help the estimate most",
-    responses={**NOT_REMEMBERED, 200: {"model": pollers.Advice}},
+    responses={**NOT_REMEMBERED, 200: {"model": estimate_schema.Advice}},
     query=AdviceQuery,
 )
 async def advice(request: Request) -> Response:

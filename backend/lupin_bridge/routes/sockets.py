@@ -16,10 +16,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Iterable
-from contextlib import ExitStack
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from contextlib import ExitStack, asynccontextmanager
 from dataclasses import replace
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket
 
@@ -31,13 +31,14 @@ from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response
 from lupin_bridge.routes.field import newest_field
-from lupin_bridge.serving.admission import AdmissionError
+from lupin_bridge.serving.admission import AdmissionError, Answer
 from lupin_bridge.serving.connections import CONNECTION_KEY
 from lupin_bridge.serving.ws_protocol import BINARY, Connection, frame_head
 from lupin_bridge.stream.frames import text_frame
-from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
+from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub, Kind
 from lupin_bridge.stream.schema import GetFieldResponse
 from lupin_bridge.viewers.foxglove import (
+    POLL_S,
     SUBPROTOCOLS,
     Session,
     message_head,
@@ -60,15 +61,6 @@ MAX_RUNNING_CALLS: Final = 2
 _WRONG_SUBPROTOCOL: Final = f"Sec-WebSocket-Protocol must offer one of {', '.join(SUBPROTOCOLS)}"
 
 
-async def has_place(websocket: WebSocket, hub: Hub) -> bool:
-    """Whether one more client may join; if not, its socket is closed with the reason."""
-    if hub.make_place(client_of(websocket)):
-        return True
-    reason = f"{hub.max_clients} clients are connected, the limit"
-    await websocket.close(CLOSE_TRY_AGAIN_LATER, reason)
-    return False
-
-
 async def next_message(websocket: WebSocket) -> str | bytes | None:
     """The client's next message; None: it has gone."""
     event = await websocket.receive()
@@ -79,32 +71,30 @@ async def next_message(websocket: WebSocket) -> str | bytes | None:
     return message
 
 
-class _Listened(Protocol):
-    """A bridge, or the fleet."""
-
-    hub: Hub
-
-    def join(self, client: Client) -> None:
-        """Add a client; it has been sent the current data when this returns."""
-
-    def serve(self, client: Client) -> None:
-        """Send a client what it lacks: its socket is free again."""
-
-
-async def listen(websocket: WebSocket, to: _Listened, **options: Any) -> None:
+async def listen(websocket: WebSocket, hub: Hub, **options: Any) -> None:
     """Send a client what it lacks until it has gone; its messages are ignored."""
-    if not await has_place(websocket, to.hub):
+    async with joined(websocket, hub, **options) as client:
+        while client is not None and await next_message(websocket) is not None:
+            pass
+
+
+@asynccontextmanager
+async def joined(websocket: WebSocket, hub: Hub, **options: Any) -> AsyncIterator[Client | None]:
+    """A client of the hub; None: there is no place, and its socket is closed with the reason."""
+    if not hub.make_place(client_of(websocket)):
+        reason = f"{hub.max_clients} clients are connected, the limit"
+        await websocket.close(CLOSE_TRY_AGAIN_LATER, reason)
+        yield None
         return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
     client = Client(connection, address=client_of(websocket), **options)
-    connection.on_writable = lambda: to.serve(client)
-    to.join(client)
+    connection.on_writable = lambda: hub.serve(client, time.monotonic())
+    hub.join(client, time.monotonic())
     try:
-        while await next_message(websocket) is not None:
-            pass
+        yield client
     finally:
         connection.on_writable = None
-        to.hub.leave(client)
+        hub.leave(client)
 
 
 class Feeds:
@@ -162,35 +152,29 @@ class Feeds:
 
 
 class _Conversation:
-    """One client of a viewer's protocol, until it has gone."""
+    """One client of a viewer's protocol, until it has gone; `options` are those of `Client`."""
+
+    _client: Client
 
     def __init__(self, websocket: WebSocket, bridge: Bridge, **options: Any) -> None:
         self._websocket = websocket
         self._bridge = bridge
+        self._options = options
         self._connection: Connection = getattr(websocket.state, CONNECTION_KEY)
-        self._client = Client(
-            self._connection,
-            address=client_of(websocket),
-            wants_status=False,
-            wants_alarms=False,
-            wants_state=False,
-            **options,
-        )
         self._feeds = Feeds(bridge.source.relay, self._send_sample, self._refuse)
         self._turn = asyncio.Lock()
 
     async def run(self) -> None:
         """Serve the client until it has gone."""
-        if not await has_place(self._websocket, self._bridge.hub):
-            return
-        self._connection.on_writable = self._on_writable
-        self._bridge.join(self._client)
-        try:
-            await self._converse()
-        finally:
-            self._connection.on_writable = None
-            self._bridge.hub.leave(self._client)
-            self._feeds.follow(())
+        hub = self._bridge.hub
+        async with joined(self._websocket, hub, wants=(), **self._options) as client:
+            if client is None:
+                return
+            self._client = client
+            try:
+                await self._converse()
+            finally:
+                self._feeds.follow(())
 
     async def _converse(self) -> None:
         """Answer the client's messages."""
@@ -208,12 +192,6 @@ class _Conversation:
     async def _refuse(self, feed: Feed, why: str) -> None:
         raise NotImplementedError
 
-    def _on_writable(self) -> None:
-        # Here and not in the hub, which looks only when a state is due: a reply may have filled
-        # the socket.
-        self._bridge.hub.is_free(self._client)
-        self._bridge.serve(self._client)
-
     async def _send(self, message: bytes) -> None:
         await self._write_when_free(text_frame(message))
 
@@ -227,8 +205,6 @@ class _Conversation:
         async with self._turn:
             if not connection.can_take:
                 hub.hold(client, rest or frame)
-                if client.blocked_since_s is None:
-                    client.blocked_since_s = time.monotonic()
             await connection.writable.wait()
             connection.write_shared(frame, rest)
         hub.bytes_sent += len(frame) + len(rest)
@@ -260,26 +236,24 @@ class _FoxgloveConversation(_Conversation):
         self._session = Session()
 
     async def _converse(self) -> None:
-        offer, has_changed = self._bridge.offer, asyncio.Event()
+        offer = self._bridge.offer
         await offer.look()
         await self._send(server_info(offer.session_id))
-        has_changed.set()
-        async with offer.followed(has_changed.set):
-            advertising = asyncio.create_task(self._advertise(has_changed))
-            await asyncio.sleep(0)  # it begins before the client's first message is taken
-            try:
-                await super()._converse()
-            finally:
-                advertising.cancel()
+        advertising = asyncio.create_task(self._advertise())
+        await asyncio.sleep(0)  # it begins before the client's first message is taken
+        try:
+            await super()._converse()
+        finally:
+            advertising.cancel()
 
-    async def _advertise(self, has_changed: asyncio.Event) -> None:
+    async def _advertise(self) -> None:
         while True:
-            await has_changed.wait()
-            has_changed.clear()
             replies = self._session.offer(self._bridge.offer.channels)
             self._feeds.follow(self._session.feeds)
             for reply in replies:
                 await self._send(reply)
+            await asyncio.sleep(POLL_S)
+            await self._bridge.offer.look()
 
     async def _take(self, message: str | bytes) -> None:
         replies = self._session.receive(message)
@@ -345,13 +319,10 @@ class _RosbridgeConversation(_Conversation):
         await self._send(status("error", why))
 
     def _follow_subscriptions(self, state_is_due: bool) -> None:
-        client = self._client
-        client.wants_state = self._session.is_subscribed
-        client.min_interval_s = self._session.min_interval_s
-        if state_is_due:
-            client.sent_seq = 0
-            client.next_due_s = 0.0
-            self._bridge.serve(client)
+        self._client.min_interval_s = self._session.min_interval_s
+        if state_is_due or not self._session.is_subscribed:
+            wants: tuple[Kind, ...] = ("state",) if self._session.is_subscribed else ()
+            self._bridge.hub.want(self._client, wants, time.monotonic())
 
     # --- calls of GetField --------------------------------------------------------------------
 
@@ -412,5 +383,7 @@ class _RosbridgeConversation(_Conversation):
             return answer.body
         client = self._client.address
         held.enter_context(bridge.admission.request(client, time.monotonic()))
-        answer = await bridge.answering.get(etag, lambda: newest_field(bridge, client, field, etag))
-        return answer.body
+        found: Answer = await bridge.answering.get(
+            etag, lambda: newest_field(bridge, client, field, etag)
+        )
+        return found.body

@@ -13,7 +13,6 @@ from fastapi import APIRouter, Request, Response, WebSocket
 from lupin_bridge import query_string
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.judge.judging import zone_of
-from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import (
     History,
     LatestOfTag,
@@ -30,7 +29,6 @@ from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     ApiRoute,
     bridge_of,
-    error_response,
     json_response,
     newest_of,
     read_route,
@@ -43,7 +41,7 @@ from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
-from lupin_twin.core.past import EVERY_TAG, NotFound, SeriesRequest
+from lupin_twin.core.past import EVERY_TAG, SeriesRequest
 
 # Longest reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
@@ -81,7 +79,7 @@ async def ws_state(websocket: WebSocket) -> None:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
         return
-    await listen(websocket, bridge, delta=query.delta, min_interval_s=query.min_interval_s)
+    await listen(websocket, bridge.hub, delta=query.delta, min_interval_s=query.min_interval_s)
 
 
 @read_route(
@@ -126,8 +124,9 @@ async def state(request: Request) -> Response:
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's latest scans with readings, sensor by sensor, and its latest attempts."""
     bridge = bridge_of(request)
-    newest = None if bridge.latest is None else tag_of(bridge.latest.snapshot, tag_id)
-    query = LatestOfTag(tag_id, newest, bridge.source.buffer_len)
+    if bridge.latest is not None:
+        tag_of(bridge.latest.snapshot, tag_id)  # or 404
+    query = LatestOfTag(tag_id, bridge.source.buffer_len)
     return await respond_past(request, query, "latest")
 
 
@@ -143,20 +142,9 @@ async def tag(request: Request, tag_id: str) -> Response:
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        return await _tag_as_of(request, tag_id, at_ns)
+        return await respond_as_of(request, OneTag(at_ns, tag_id, bridge.criteria.sensors))
     found = tag_of(newest_of(bridge), tag_id)
     return json_response(bridge.frames.json.tag(found, bridge.ros_time_ns))
-
-
-async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
-    bridge = bridge_of(request)
-    try:
-        return await respond_as_of(request, OneTag(at_ns, tag_id, bridge.criteria.sensors))
-    except NotFound as error:
-        journal = bridge.source.journal()
-        response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
-        response.headers.update(bodies.moment_headers(journal, at_ns))
-        return response
 
 
 # --- the past: one sensor's readings, what happened when, and the shift report of both ------------

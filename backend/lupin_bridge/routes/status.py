@@ -39,8 +39,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream import routes_schema, schema
-from lupin_bridge.stream.pollers import robot_body
-from lupin_bridge.stream.state_json import alarms_body, header, judgement, pose, stamp
+from lupin_bridge.stream.state_json import alarms_body, header, judgement, pose, robot_body, stamp
 from lupin_twin.core.state import Pose
 from lupin_twin.field.explored import OccupancyMap
 
@@ -162,7 +161,7 @@ async def _map(request: Request, kind: str) -> Response:
 )
 async def robot(request: Request) -> Response:
     """From the robot's own topics. Only current data: the journal does not record it."""
-    known = bridge_of(request).robot.log
+    known = bridge_of(request).robot
 
     async def compute() -> Answer:
         return Answer(robot_body(known), "application/json", NEVER_STORE)

@@ -14,10 +14,10 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import blake2b
 from ipaddress import IPv6Address, ip_address
-from itertools import islice
-from typing import Final
+from typing import Any, Final
 
 # One entry is a key and a number: some hundred kilobytes when the table is full.
 MAX_KEYS: Final = 4_096
@@ -152,14 +152,12 @@ class Admission:
         self.in_flight: Counter[str] = Counter()
         # The exports being sent, by client: since when, s, and what breaks it off.
         self.exports: dict[str, tuple[float, Callable[[], None]]] = {}
-        total = limits.total_concurrency
-        self._computing = _Places(total)
-        self._large = _Places(total - total // 4)
+        self._computing: Counter[str] = Counter()
 
     @property
     def being_computed(self) -> int:
         """How many computations keep the twin and the workers busy now."""
-        return self._computing.taken.total()
+        return self._computing.total()
 
     @contextmanager
     def request(self, client: str, now_s: float) -> Iterator[None]:
@@ -222,59 +220,41 @@ class Admission:
     def computing(self, client: str, *, is_large: bool = False) -> Iterator[int]:
         """A computation, which counts once for all clients that wait for it.
 
-        `client` was the first to request it. Yields how many large ones the client has under way
-        with this one. It is queued as if it cost that many times as much, so that a client that
+        `client` was the first to request it. Yields how many the client has under way with this
+        one. A large one is queued as if it cost that many times as much, so that a client that
         sends many lets those of others pass. A small one is never delayed: 1.
 
         Raises:
             BusyError: all slots are taken, or the client would take more than it leaves free.
 
         """
-        if self._computing.is_full_for(client):
-            self.refused["total_in_flight"] += 1
-            raise BusyError(self._computing.why_not(client, "answers"), 1.0)
-        if is_large and self._large.is_full_for(client):
-            self.refused["large_in_flight"] += 1
-            raise BusyError(self._large.why_not(client, "large answers"), 1.0)
-        taken = (self._computing, self._large) if is_large else (self._computing,)
-        for places in taken:
-            places.taken[client] += 1
+        taken, limit = self._computing, self._limits.total_concurrency
+        if is_large:
+            limit -= limit // 4
+        if taken[client] >= limit - taken.total():
+            self.refused["large_in_flight" if is_large else "total_in_flight"] += 1
+            raise BusyError(
+                f"{taken.total()} answers are being computed, {taken[client]} of them for "
+                f"{client}: the limit is {limit}{' for large ones' if is_large else ''}, and no "
+                "client takes more than it leaves free",
+                1.0,
+            )
+        taken[client] += 1
         try:
-            yield self._large.taken[client] if is_large else 1
+            yield taken[client] if is_large else 1
         finally:
-            for places in taken:
-                _give_back(places.taken, client)
+            _give_back(taken, client)
 
 
-class _Places:
-    """A number of slots for all clients, of which none takes more than it leaves free."""
-
-    def __init__(self, limit: int) -> None:
-        self.limit = limit
-        self.taken: Counter[str] = Counter()
-
-    def is_full_for(self, client: str) -> bool:
-        return self.taken[client] >= self.limit - self.taken.total()
-
-    def why_not(self, client: str, what: str) -> str:
-        return (
-            f"{self.taken.total()} {what} are being computed, {self.taken[client]} of them for "
-            f"{client}: the limit is {self.limit}, and no client takes more than it "
-            "leaves free"
-        )
-
-
-def _give_back(taken: Counter[str], client: str) -> None:
-    taken[client] -= 1
-    if not taken[client]:
-        del taken[client]
+def _give_back(taken: Counter[Any], key: Hashable) -> None:
+    taken[key] -= 1
+    if not taken[key]:
+        del taken[key]
 
 
 MAX_BYTES: Final = 64_000_000
 # Rough overhead of an entry, counted in addition to its body.
 ENTRY_BYTES: Final = 1_000
-# Entries that are searched for the newest ETags.
-MAX_NEWEST: Final = 64
 
 
 # Browsers and proxies cache the answer, and check each time whether it is still valid.
@@ -298,16 +278,6 @@ def content_answer(
     return Answer(body, media_type, {"ETag": etag, **REVALIDATE, **(headers or {})})
 
 
-@dataclass(slots=True, eq=False)
-class _Entry:
-    answer: Answer
-    readers: int = 0
-
-    @property
-    def bytes(self) -> int:
-        return len(self.answer.body) + ENTRY_BYTES
-
-
 class AnswerCache:
     """Answers by their keys, the least recently used dropped first. Belongs to one thread.
 
@@ -318,48 +288,40 @@ class AnswerCache:
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self.bytes = 0
         self._max_bytes = max_bytes
-        self._entries: OrderedDict[Hashable, _Entry] = OrderedDict()
+        self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
+        # How many clients an answer is being sent to.
+        self._readers: Counter[Hashable] = Counter()
 
     def __len__(self) -> int:
-        return len(self._entries)
+        return len(self._answers)
 
     def put(self, key: Hashable, answer: Answer, instead_of: Hashable | None = None) -> None:
         """Cache an answer if room can be made; the one under `instead_of` is dropped first."""
         for old in (key, instead_of):
-            entry = self._entries.get(old)
-            if entry is not None and not entry.readers:
+            if old in self._answers and not self._readers[old]:
                 self._drop(old)
-        if key in self._entries:
+        if key in self._answers:
             return  # the same answer, which is being sent
-        new = _Entry(answer)
-        if new.bytes > self._max_bytes:
+        size = len(answer.body) + ENTRY_BYTES
+        if size > self._max_bytes:
             return
-        idle = (old for old, entry in list(self._entries.items()) if not entry.readers)
-        while self.bytes + new.bytes > self._max_bytes:
+        idle = (old for old in list(self._answers) if not self._readers[old])
+        while self.bytes + size > self._max_bytes:
             victim = next(idle, None)
             if victim is None:
                 return
             self._drop(victim)
-        self._entries[key] = new
-        self.bytes += new.bytes
+        self._answers[key] = answer
+        self.bytes += size
 
     def lend(self, key: Hashable) -> tuple[Answer, Callable[[], None]] | None:
         """The answer under `key`, and what to call once it is sent; None: there is none."""
-        entry = self._entries.get(key)
-        if entry is None:
+        answer = self._answers.get(key)
+        if answer is None:
             return None
-        self._entries.move_to_end(key)
-        entry.readers += 1
-
-        def release() -> None:
-            entry.readers -= 1
-
-        return entry.answer, release
-
-    def newest_tags(self) -> list[str]:
-        """The most recently used keys that are ETags."""
-        newest = islice(reversed(self._entries), MAX_NEWEST)
-        return [key for key in newest if isinstance(key, str)]
+        self._answers.move_to_end(key)
+        self._readers[key] += 1
+        return answer, partial(_give_back, self._readers, key)
 
     def _drop(self, key: Hashable) -> None:
-        self.bytes -= self._entries.pop(key).bytes
+        self.bytes -= len(self._answers.pop(key).body) + ENTRY_BYTES

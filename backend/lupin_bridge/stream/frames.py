@@ -353,7 +353,6 @@ class FrameWriter:
             _writer=self,
         )
         self._newest = frame
-        self.json.keep_only(snapshot)
-        self.plain_json.keep_only(snapshot)
-        self.message_json.keep_only(snapshot)
+        for json in (self.json, self.plain_json, self.message_json):
+            json.keep_only(snapshot)
         return frame

@@ -11,9 +11,9 @@ No I/O and no clock here: connections and times (s of a monotonic clock) are arg
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from typing import Final, Literal, Protocol
+from typing import Final, Literal, Protocol, get_args
 
 import orjson
 
@@ -90,8 +90,12 @@ def next_beat_s(due_s: float, now_s: float, interval_s: float) -> float:
     return max(due_s, now_s - BEAT_SLACK * interval_s) + interval_s
 
 
-# Frames beside those of the state.
-Beside = Literal["alarms", "robot"]
+# What a client may get, in this order. The robot and the alarms follow a state, so that the client
+# knows the alarms' tags, and the time for ages.
+Kind = Literal["status", "state", "alarms", "robot"]
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+# These come at the client's rate.
+PACED: Final = ("state", "robot")
 
 
 class Writable(Protocol):
@@ -118,27 +122,23 @@ def plain_wire(client: Client, frame: StateFrame) -> bytes:
 
 @dataclass(slots=True, eq=False)
 class Client:
-    """One client: what it requested, what it was sent, and since when its socket is full.
+    """One client: what it requested, what it lacks, and since when its socket is full.
 
     `min_interval_s` is the mean time between two frames; a frame may come a tenth earlier. `wire`
-    serializes a frame for this client. `address` is the one whose share of the connections it
-    counts towards. `written_s` is the time of the last write.
+    serializes a state for this client. `address` is the one whose share of the connections it
+    counts towards. `due` is what it lacks, of what it `wants`. `written_s` is the time of the last
+    write.
     """
 
     connection: Writable
     address: str = ""
     delta: bool = False
     min_interval_s: float = 0.0
-    wants_status: bool = True
-    wants_state: bool = True
-    wants_alarms: bool = True
+    wants: Collection[Kind] = KINDS
     wire: Callable[[Client, StateFrame], bytes] = plain_wire
+    due: set[Kind] = field(default_factory=set)
     sent_seq: int = 0
-    next_due_s: float = 0.0
-    status_due: bool = True
-    # Kinds of frames beside the state, that it lacks; `Hub.publish_beside` adds to them.
-    beside_due: set[str] = field(default_factory=set)
-    robot_next_s: float = 0.0
+    next_s: dict[Kind, float] = field(default_factory=dict)
     written_s: float = 0.0
     blocked_since_s: float | None = None
 
@@ -160,7 +160,7 @@ class Hub:
         self.unsent = Unsent()
         self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
-        self._beside: dict[str, bytes] = {}
+        self._beside: dict[Kind, bytes] = {}
         self._status_at = status_at
         self._status_wire: bytes | None = None
         self._status_wire_s = 0.0
@@ -207,8 +207,17 @@ class Hub:
     def join(self, client: Client, now_s: float) -> None:
         """Add a client and give it the status and the current state at once, in that order."""
         self._clients[client] = None
-        client.beside_due = {*self._beside}
         self._parties[client.address] += 1
+        self.want(client, client.wants, now_s)
+
+    def want(self, client: Client, kinds: Collection[Kind], now_s: float) -> None:
+        """Have a client get these kinds from now on, beginning with the newest of each."""
+        client.wants, client.sent_seq = kinds, 0
+        client.next_s.clear()
+        known: set[Kind] = {"status", *self._beside}
+        if self._frame is not None:
+            known.add("state")
+        client.due = known.intersection(kinds)
         self.serve(client, now_s)
 
     def leave(self, client: Client) -> None:
@@ -229,21 +238,25 @@ class Hub:
             for slowest in self.unsent.hold(client, message):
                 self.evict(slowest, "slow to take what it requested, and others need the memory")
 
-    def is_free(self, client: Client) -> None:
-        """Note that a client's socket has taken everything."""
-        client.blocked_since_s = None
-        self.unsent.let_go(client)
-
     def publish(self, frame: StateFrame, now_s: float) -> None:
         """Make this the newest frame, and send it to every client that can take it."""
         self._frame = frame
-        self.serve_all(now_s)
+        self._send("state", now_s)
 
     def announce(self, now_s: float) -> None:
         """Send the status, which has changed, to every client that can take it."""
         self._status_wire = None
+        self._send("status", now_s)
+
+    def publish_beside(self, kind: Literal["alarms", "robot"], wire: bytes, now_s: float) -> None:
+        """Send this changed frame to every client that can take it."""
+        self._beside[kind] = wire
+        self._send(kind, now_s)
+
+    def _send(self, kind: Kind, now_s: float) -> None:
         for client in self._clients:
-            client.status_due = True
+            if kind in client.wants:
+                client.due.add(kind)
         self.serve_all(now_s)
 
     def remind(self, now_s: float) -> None:
@@ -253,18 +266,8 @@ class Hub:
         """
         for client in self._clients:
             silence_s = max(REMINDED_AFTER_S, client.min_interval_s)
-            if now_s >= client.written_s + silence_s:
-                client.status_due = True
-
-    def publish_beside(self, kind: Beside, wire: bytes, now_s: float) -> None:
-        """Send this changed frame to every client that wants alarms, and can take it.
-
-        A client gets the robot's at its rate of states.
-        """
-        self._beside[kind] = wire
-        for client in self._clients:
-            client.beside_due.add(kind)
-        self.serve_all(now_s)
+            if "status" in client.wants and now_s >= client.written_s + silence_s:
+                client.due.add("status")
 
     def serve_all(self, now_s: float) -> None:
         """Send every client what it lacks and can take now."""
@@ -273,40 +276,46 @@ class Hub:
 
     def serve(self, client: Client, now_s: float) -> None:
         """Send a client what it lacks, as far as its socket and its rate allow."""
-        if client.status_due and client.wants_status:
+        for kind in KINDS:
+            if kind not in client.due or now_s < client.next_s.get(kind, 0.0):
+                continue
+            if kind in self._beside and not client.sent_seq:
+                continue
             if not self._can_take(client, now_s):
                 return
-            self._write(client, self._status_at_once(now_s), now_s)
-            client.status_due = False
-        if not client.wants_state:
-            self._can_take(client, now_s)
-            return
-        self._serve_state(client, now_s)
-        # Only after a state, so that the client knows the alarms' tags and the time for ages.
-        if not (client.wants_alarms and client.sent_seq):
-            return
-        for kind in sorted(client.beside_due):
-            if kind == "robot" and now_s < client.robot_next_s:
-                continue
-            if self._can_take(client, now_s):
-                self._write(client, self._beside[kind], now_s)
-                client.beside_due.discard(kind)
-                if kind == "robot":
-                    client.robot_next_s = now_s + client.min_interval_s
+            client.due.discard(kind)
+            if kind in PACED and client.min_interval_s:
+                due_s = client.next_s.get(kind, 0.0)
+                client.next_s[kind] = next_beat_s(due_s, now_s, client.min_interval_s)
+            wire = self._wire(kind, client, now_s)
+            client.written_s = now_s
+            client.connection.write(wire)
+            self.bytes_sent += len(wire)
+        if self._can_take(client, now_s):
+            self.unsent.let_go(client)
 
-    def _serve_state(self, client: Client, now_s: float) -> None:
+    def _can_take(self, client: Client, now_s: float) -> bool:
+        """Whether the client's socket has taken everything; notes since when it has not."""
+        if client.connection.can_take:
+            client.blocked_since_s = None
+            return True
+        if client.blocked_since_s is None:
+            client.blocked_since_s = now_s
+        return False
+
+    def _wire(self, kind: Kind, client: Client, now_s: float) -> bytes:
+        if kind == "status":
+            return self._status_at_once(now_s)
+        if kind != "state":
+            return self._beside[kind]
         frame = self._frame
-        if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
-            return
-        if not self._can_take(client, now_s):
-            return
-        self._write(client, client.wire(client, frame), now_s)
+        assert frame is not None  # or none is due
+        wire = client.wire(client, frame)
         if client.sent_seq:
             self.frames_skipped += frame.seq - client.sent_seq - 1
         self.frames_sent += 1
         client.sent_seq = frame.seq
-        if client.min_interval_s:
-            client.next_due_s = next_beat_s(client.next_due_s, now_s, client.min_interval_s)
+        return wire
 
     def dismiss_stuck(self, now_s: float) -> int:
         """Close every client that has not taken a frame for too long; returns how many."""
@@ -328,17 +337,3 @@ class Hub:
             self._status_wire = text_frame(orjson.dumps(self._status_at(now_s).frame()))
             self._status_wire_s = now_s
         return self._status_wire
-
-    def _can_take(self, client: Client, now_s: float) -> bool:
-        """Whether the client's socket has taken everything; notes since when it has not."""
-        if client.connection.can_take:
-            return True
-        if client.blocked_since_s is None:
-            client.blocked_since_s = now_s
-        return False
-
-    def _write(self, client: Client, wire: bytes, now_s: float) -> None:
-        client.blocked_since_s = None
-        client.written_s = now_s
-        client.connection.write(wire)
-        self.bytes_sent += len(wire)

@@ -405,10 +405,7 @@ class PastAttempt(Contract):
     stamp: Time
     status: int = Field(description="as in lupin_msgs/Observation: 0 is OK")
     status_detail: str = Field(description="why the status is not OK, for a person to read")
-    kind: int | None = Field(
-        description="as in lupin_msgs/Observation: 0 scan, 1 inspection; null: the attempt failed, "
-        "and is not in the journal yet"
-    )
+    kind: int = Field(description="as in lupin_msgs/Observation: 0 scan, 1 inspection")
 
 
 class TagHistory(Contract):

@@ -1,4 +1,4 @@
-"""Snapshots, alarms and judgements as JSON, with the names of the ROS messages.
+"""Snapshots, alarms, judgements and the robot as JSON, with the names of the ROS messages.
 
 Pure. NaN and infinity are null. A tag's text is cached until the tag changes, except for its age,
 which changes in every frame. What the web contract adds to the message's own fields is omitted
@@ -17,10 +17,7 @@ from lupin_bridge.judge.verdict import derive
 from lupin_twin.core.history import KNOWN_BY_NOTHING, key_of
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import (
-    KIND_FLOWER,
-    KIND_TAG_READING,
     NANOSECONDS_PER_SECOND,
-    STATUS_OK,
     Attempt,
     Observation,
     Pose,
@@ -32,6 +29,7 @@ from lupin_twin.core.state import (
 
 if TYPE_CHECKING:  # not loaded by modules that only need `moment`
     from lupin_bridge.alarms.board import AlarmNotes
+    from lupin_bridge.feed.source import Position, Robot, RobotLog
     from lupin_bridge.judge.episodes import Alarm
     from lupin_bridge.judge.judging import Judged
     from lupin_bridge.judge.verdict import Health, Reason
@@ -171,17 +169,14 @@ def header(stamp_ns: int, frame_id: str) -> dict[str, Any]:
     return {"stamp": stamp(stamp_ns), "frame_id": frame_id}
 
 
-def history(
-    tag_id: str, writes: Iterable[Observation], newest: TagState | None, count: int
-) -> dict[str, Any]:
+def history(tag_id: str, writes: Iterable[Observation], count: int) -> dict[str, Any]:
     """`schema.TagHistory`: a tag's last `count` scans with readings, and as many attempts.
 
-    `newest` is the tag's state; it may hold what `writes`, read from the journal, lack so far. Of
-    equal stamps, all are in order of arrival.
+    Of equal stamps, all are in order of arrival.
     """
     # Stamp and values of each scan; each attempt, and its kind.
     scans: dict[object, tuple[int, dict[str, float]]] = {}
-    attempts: dict[object, tuple[Attempt, int | None]] = {}
+    attempts: dict[object, tuple[Attempt, int]] = {}
     sources: list[tuple[int, int, str]] = []
     for number, write in enumerate(writes):
         key: object = number if write.own_stamp_ns == KNOWN_BY_NOTHING else key_of(write)
@@ -191,8 +186,6 @@ def history(
             scans.setdefault(key, (stamp_ns, {}))[1].update(write.values)
         if write.source:
             sources.append((stamp_ns, number, write.source))
-    if newest is not None:
-        _add_newest(newest, scans, attempts)
     sensors: dict[str, list[dict[str, Any]]] = {}
     for stamp_ns, values in sorted(scans.values(), key=lambda scan: scan[0])[-count:]:
         readings = [Reading(name, value) for name, value in sorted(values.items())]
@@ -216,41 +209,6 @@ def history(
             for attempt, kind in last
         ],
     }
-
-
-def _add_newest(
-    tag: TagState,
-    scans: dict[object, tuple[int, dict[str, float]]],
-    attempts: dict[object, tuple[Attempt, int | None]],
-) -> None:
-    known = {(at, name, repr(value)) for at, own in scans.values() for name, value in own.items()}
-    for reading in tag.readings:
-        at_ns = reading.observed_at_ns
-        if at_ns is not None and (at_ns, reading.name, repr(reading.value)) not in known:
-            key = KIND_TAG_READING, at_ns, ""
-            scans.setdefault(key, (at_ns, {}))[1][reading.name] = reading.value
-    attempted = {attempt for attempt, _ in attempts.values()}
-    for attempt, kind in _attempts_of(tag):
-        if attempt not in attempted:
-            attempts[kind, attempt.stamp_ns, ""] = attempt, kind
-
-
-def _attempts_of(tag: TagState) -> list[tuple[Attempt, int | None]]:
-    """The attempts known from a state: the last one, and the last inspection that saw flowers.
-
-    With their kinds; None if unknown: a state does not hold the kind of a failed one.
-    """
-    last, attempts = tag.last_try, list[tuple[Attempt, int | None]]()
-    if tag.looked_at_ns is not None and (last is None or tag.looked_at_ns != last.stamp_ns):
-        attempts.append((Attempt(tag.looked_at_ns), KIND_FLOWER))
-    if last is not None:
-        kind = None
-        if any(reading.observed_at_ns == last.stamp_ns for reading in tag.readings):
-            kind = KIND_TAG_READING
-        elif last.stamp_ns == tag.looked_at_ns and last.status == STATUS_OK:
-            kind = KIND_FLOWER
-        attempts.append((last, kind))
-    return attempts
 
 
 # --- alarms and judgements ------------------------------------------------------------------------
@@ -386,3 +344,38 @@ def reason_json(reason: Reason) -> dict[str, Any]:
     if reason.release is not None:
         found["release"] = reason.release
     return found
+
+
+# --- the robot ------------------------------------------------------------------------------------
+
+
+def robot_body(known: RobotLog) -> bytes:
+    """`routes_schema.Robot`."""
+    return orjson.dumps({**_robot_now(known.now), "trail": [_point(it) for it in known.trail]})
+
+
+def robot_message(known: RobotLog) -> bytes:
+    """`routes_schema.RobotFrame`."""
+    return orjson.dumps({"type": "robot", **_robot_now(known.now)})
+
+
+def _robot_now(now: Robot) -> dict[str, Any]:
+    position, plan, battery = now.position, now.plan, now.battery
+    return {
+        "position": position
+        and {
+            **_point(position),
+            "heading": None if position.heading is None else round(position.heading, 3),
+        },
+        "plan": plan
+        and {
+            "points": [(round(x, 2), round(y, 2)) for x, y in plan.points],
+            "observed_at": stamp(plan.at_ns),
+        },
+        "battery": battery
+        and {"percent": round(battery.percent, 1), "observed_at": stamp(battery.at_ns)},
+    }
+
+
+def _point(at: Position) -> dict[str, Any]:
+    return {"x": round(at.x, 2), "y": round(at.y, 2), "observed_at": stamp(at.at_ns)}

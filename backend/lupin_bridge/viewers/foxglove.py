@@ -13,10 +13,11 @@ are clients, once for all of them.
 from __future__ import annotations
 
 import asyncio
+import math
 import struct
+import time
 import uuid
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -27,7 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lupin_bridge.feed.relay import Feed, Sample, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.feed.tasks import Periodic, Shared
+from lupin_bridge.feed.tasks import Shared
 from lupin_bridge.serving.ws_protocol import members_of, model_of, shown
 from lupin_twin.core import interfaces
 from lupin_twin.core.interfaces import Topic
@@ -177,7 +178,7 @@ class Session:
         replies = []
         if gone:
             replies.append(unadvertise(gone))
-        if new or not self._advertised:
+        if new:
             replies.append(advertise(new))
         self._advertised = dict(channels)
         self._subscriptions = {
@@ -221,8 +222,9 @@ def _errors(errors: list[str]) -> tuple[bytes, ...]:
     return (error_status("; ".join(errors)),) if errors else ()
 
 
-# How often layers are looked for, s.
+# How often a client looks for layers, and how long what another client has found is new enough, s.
 POLL_S: Final = 2.0
+FRESH_S: Final = 1.0
 MAX_LAYERS: Final = 64
 
 
@@ -234,27 +236,13 @@ class Offer:
         self.channels: dict[int, Channel] = {}
         self._source = source
         self._ids = count(1)
-        self._followers: dict[Callable[[], None], None] = {}
-        self._following: Periodic
+        self._looked_s = -math.inf
         self._looking: Shared[None] = Shared()
 
-    @asynccontextmanager
-    async def followed(self, on_change: Callable[[], None]) -> AsyncIterator[None]:
-        """Have `on_change` called when channels change."""
-        self._followers[on_change] = None
-        if len(self._followers) == 1:
-            self._following = Periodic(self.look, POLL_S, "foxglove's layers")
-            self._following.start()
-        try:
-            yield
-        finally:
-            del self._followers[on_change]
-            if not self._followers:
-                await self._following.stop()
-
     async def look(self) -> None:
-        """Bring the channels up to date; concurrent callers share one look."""
-        await self._looking.get("look", self._look)
+        """Bring the channels up to date; all clients share the looks."""
+        if time.monotonic() >= self._looked_s + FRESH_S:
+            await self._looking.get("look", self._look)
 
     async def _look(self) -> None:
         names = self._source.names
@@ -266,11 +254,8 @@ class Offer:
         wanted += [Topic(kind, "", name) for name, kind in sorted(published.items())[:MAX_LAYERS]]
         known = {channel.topic: channel for channel in self.channels.values()}
         found = [known.get(topic) or await self._channel(topic) for topic in wanted]
-        channels = {channel.id: channel for channel in found}
-        if channels != self.channels:
-            self.channels = channels
-            for on_change in list(self._followers):
-                on_change()
+        self.channels = {channel.id: channel for channel in found}
+        self._looked_s = time.monotonic()
 
     async def _channel(self, topic: Topic) -> Channel:
         text = await asyncio.to_thread(schema_text, topic.type_name)

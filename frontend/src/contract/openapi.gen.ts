@@ -192,7 +192,7 @@ export interface components {
             readonly stamp: components["schemas"]["Time"];
             readonly status: number;
             readonly status_detail: string;
-            readonly kind: number | null;
+            readonly kind: number;
         };
         readonly Patrol: {
             readonly interval_s: number | null;

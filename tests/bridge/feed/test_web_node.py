@@ -27,7 +27,9 @@ class Stage:
         self._context = Context()
         rclpy.init(args=list(ros_args), context=self._context, domain_id=domain)
         self.reported: list[Snapshot] = []
-        self.node = WebNode(self.reported.append, context=self._context)
+        self.node = WebNode(
+            lambda update: self.reported.append(update.snapshot), context=self._context
+        )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self.stamp_s = 0

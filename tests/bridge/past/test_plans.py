@@ -21,7 +21,6 @@ from lupin_bridge.past.plans import (
     Answered,
     Health,
     History,
-    LatestOfTag,
     OneTag,
     Plan,
     Query,
@@ -42,10 +41,9 @@ from lupin_twin.core.past import (
     SeriesRequest,
     grid,
 )
-from lupin_twin.core.state import Attempt, Pose, Reading, Snapshot, TagState
+from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRules
-from lupin_twin.field.idw import never
 from lupin_twin.journal.counts import Buckets, individually
 from lupin_twin.runtime.workers import SMALL_S
 from tests.support.past import MadeUp
@@ -229,17 +227,6 @@ def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> Non
     history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN_JOURNAL)
     assert history.cost_s(30) < SMALL_S
     assert Timeline(0, 0, 1, "a", UNKNOWN_JOURNAL).cost_s(30) > SMALL_S
-
-
-def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
-    tag = TagState("a", None, (Reading("co2", 7.0, 5 * NS),), 5 * NS, last_try=Attempt(5 * NS))
-    for latest, values in ((tag, [7.0]), (None, [])):
-        body = LatestOfTag("a", latest, 3).look(log_of(SITE)).write(never).body
-        reported = json.loads(body)
-        assert [
-            each["value"] for sensor in reported["sensors"] for each in sensor["values"]
-        ] == values
-        assert len(reported["tries"]) == len(values)
 
 
 S = 10**9

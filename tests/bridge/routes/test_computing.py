@@ -125,7 +125,7 @@ async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_
         for task in refused:
             answer = await task
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "1")
-            text = "12 large answers are being computed, 12 of them for 127.0.0.1"
+            text = "12 answers are being computed, 12 of them for 127.0.0.1"
             assert text in answer.json()["detail"]
         async with httpx.AsyncClient(transport=other, timeout=PATIENCE_S) as client:
             theirs = asyncio.create_task(client.get(it.url + field("co2 51", LARGE)))

@@ -13,7 +13,12 @@ from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetEstimate
 from PIL import Image
 
-from lupin_bridge.stream.pollers import Advice, EstimateQualities, ExpectedTags, GetEstimateResponse
+from lupin_bridge.stream.estimate_schema import (
+    Advice,
+    EstimateQualities,
+    ExpectedTags,
+    GetEstimateResponse,
+)
 from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, append

@@ -306,7 +306,9 @@ async def test_a_matching_etag_gets_304_and_nothing_is_written(
             assert answer.headers["etag"] != tag
 
 
-async def test_a_written_answer_is_cached(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_an_answer_that_took_long_is_not_written_again(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     computed = []
     compute = engine.compute_field
 
@@ -316,11 +318,14 @@ async def test_a_written_answer_is_cached(domain: int, monkeypatch: pytest.Monke
 
     monkeypatch.setattr(fields, "compute_field", counted)
     async with remembering(MadeUp(snapshot=greenhouse())) as it:
-        path = f"/api/field?{FIELD}"
-        # No scan in between: it is the same field.
-        bodies = {(await it.http.get(f"{path}&at={at}")).content for at in (9, 9, 9.5, 10)}
-        assert (len(bodies), len(computed)) == (1, 1)
-        assert (await it.http.get(f"{path}&at=9&resolution=0.5")).status_code == 400
+        path = "/api/field?sensor_type=co2&resolution=0.4"
+        for long_s, times in ((0.0, 1), (60.0, 4)):
+            monkeypatch.setattr(plans, "KEPT_IF_S", long_s)
+            computed.clear()
+            # No scan in between: it is the same field.
+            bodies = {(await it.http.get(f"{path}&at={at}")).content for at in (9, 9, 9.5, 10)}
+            assert (len(bodies), len(computed)) == (1, times)
+            path = path.replace("0.4", "0.3")
 
 
 async def test_simultaneous_equal_queries_run_once(domain: int) -> None:

@@ -145,8 +145,10 @@ def test_attempts_and_their_times_are_reported(twin: Bridge) -> None:
     assert (tag["last_try"]["sec"], tag["last_try_status"]) == (7300, 2)
     assert tag["last_try_detail"] == "not decoded"
     expected = {"co2": [400.0], "light": [1.0, 2.0]}
-    wait_for(lambda: history(twin, "told") == expected, "all in the log")
-    past = twin.json("/api/tags/told/history")
+    wait_for(lambda: history(twin, "told") == expected, "all readings in the log")
+    path = "/api/tags/told/history"
+    wait_for(lambda: twin.json(path)["tries"][-1]["status"] == 2, "the failed attempt too")
+    past = twin.json(path)
     schema.TagHistory.model_validate(past)
     assert (past["tag_id"], past["source"]) == ("told", "test")
     assert [(each["stamp"]["sec"], each["status"], each["kind"]) for each in past["tries"]] == [

@@ -16,7 +16,6 @@ from lupin_bridge.serving.admission import (
     ENTRY_BYTES,
     EXPORTS,
     LONG_EXPORT_S,
-    MAX_NEWEST,
     Admission,
     Answer,
     AnswerCache,
@@ -325,14 +324,3 @@ def test_the_bound_always_holds(steps: list[Step]) -> None:
     assert (len(stored), stored.bytes) == (1, 60 + 3 * ENTRY_BYTES), (
         "nobody holds anything any more"
     )
-
-
-def test_the_newest_tags_are_reported() -> None:
-    stored = AnswerCache()
-    for number in range(MAX_NEWEST + 1):
-        stored.put(f'"{number}"', Answer(b"", "text/plain"))
-    assert stored.newest_tags() == [f'"{number}"' for number in range(MAX_NEWEST, 0, -1)]
-    stored.put(("no", "tag"), Answer(b"", "text/plain"))
-    lent = stored.lend('"1"')
-    assert lent is not None
-    assert stored.newest_tags()[:2] == ['"1"', f'"{MAX_NEWEST}"']

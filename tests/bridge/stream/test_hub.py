@@ -9,12 +9,13 @@ import pytest
 
 from lupin_bridge.alarms.board import board_of
 from lupin_bridge.stream.frames import FrameWriter, Reason, Status, alarms_message
-from lupin_bridge.stream.hub import CLOSE_POLICY, LARGE_BYTES, Client, Hub
+from lupin_bridge.stream.hub import CLOSE_POLICY, KINDS, LARGE_BYTES, Client, Hub
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm
 
 TIMEOUT_S = 30.0
+NO_STATUS = KINDS[1:]
 AIR = (Reading("temperature", 25.0), Reading("humidity", 60.0))
 
 
@@ -105,7 +106,7 @@ def test_after_a_second_without_a_frame_the_status_is_sent_again(stage: Stage) -
     stage.join(often, 10.0)
     stage.join(seldom, 10.0, min_interval_s=5.0)
     stage.join(full, 10.0)
-    stage.join(rosbridge, 10.0, wants_status=False)
+    stage.join(rosbridge, 10.0, wants=NO_STATUS)
     for now_s in (10.9, 11.0, 11.9, 12.0, 14.9, 15.0):
         stage.hub.remind(now_s)
         stage.hub.serve_all(now_s)
@@ -143,8 +144,8 @@ def test_eviction_needs_an_address_with_two_fewer(mine: int, gets_a_place: bool)
 
 def test_a_slow_client_is_never_queued_for_and_gets_the_latest_frame(stage: Stage) -> None:
     slow, quick = Socket(room=1), Socket()
-    client = stage.join(slow, wants_status=False)
-    stage.join(quick, wants_status=False)
+    client = stage.join(slow, wants=NO_STATUS)
+    stage.join(quick, wants=NO_STATUS)
     for number in range(8):
         stage.publish(number / 10)
     assert slow.got == [1]
@@ -163,7 +164,7 @@ def test_of_waiting_large_messages_the_longest_waiting_client_is_dismissed(stage
     sockets = [Socket() for _ in range(4)]
     free, slowest, *others = (stage.join(socket) for socket in sockets)
     stage.hub.hold(free, bytes(LARGE_BYTES))
-    stage.hub.is_free(free)
+    stage.hub.serve(free, 0.0)
     stage.hub.hold(Client(Socket()), bytes(LARGE_BYTES))  # which has disconnected already
     assert stage.hub.unsent.bytes == 0
     stage.hub.hold(slowest, bytes(LARGE_BYTES))
@@ -178,9 +179,9 @@ def test_of_waiting_large_messages_the_longest_waiting_client_is_dismissed(stage
 
 def test_a_client_that_takes_nothing_for_too_long_is_closed_and_removed(stage: Stage) -> None:
     stuck, quick = Socket(room=0), Socket()
-    stage.join(stuck, wants_status=False)
+    stage.join(stuck, 10.0, wants=NO_STATUS)
     stage.join(quick)
-    stage.publish(10.0)
+    stage.publish(15.0)
     stage.publish(20.0)
     assert stage.hub.dismiss_stuck(10.0 + TIMEOUT_S - 0.1) == 0
     assert stage.hub.dismiss_stuck(10.0 + TIMEOUT_S) == 1
@@ -193,8 +194,8 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_removed(stage: S
 def test_deltas_go_to_clients_that_chose_them_and_have_the_frame_before(stage: Stage) -> None:
     socket, whole = Socket(), Socket()
     stage.publish()
-    client = stage.join(socket, delta=True, wants_status=False)
-    stage.join(whole, wants_status=False)
+    client = stage.join(socket, delta=True, wants=NO_STATUS)
+    stage.join(whole, wants=NO_STATUS)
     stage.publish()
     stage.publish()
     assert socket.got == [1, (1, 2), (2, 3)]
@@ -238,7 +239,7 @@ def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage)
 )
 def test_a_rate_is_a_mean(stage: Stage, times_s: Sequence[float], got: list[int]) -> None:
     on_average = Socket()
-    stage.join(on_average, min_interval_s=1.0, wants_status=False)
+    stage.join(on_average, min_interval_s=1.0, wants=NO_STATUS)
     for now_s in times_s:
         stage.publish(now_s)
     assert on_average.got == got
@@ -248,7 +249,7 @@ def test_every_change_of_alarms_goes_to_everyone_whole_and_after_the_first_state
     stage, sockets = Stage(), [Socket(), Socket()]
     stage.publish()
     for socket in sockets:
-        stage.join(socket, delta=True, wants_status=False)
+        stage.join(socket, delta=True, wants=NO_STATUS)
     stage.alarms("a")
     stage.publish()
     stage.alarms("a", "b")
@@ -270,9 +271,10 @@ def test_every_change_of_alarms_goes_to_everyone_whole_and_after_the_first_state
 
 def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage: Stage) -> None:
     usual, seldom = Socket(), Socket()
-    stage.join(usual, wants_status=False)
-    stage.join(seldom, wants_status=False, min_interval_s=10.0)
-    none = stage.join(Socket(), wants_status=False, wants_alarms=False)
+    stage.join(usual, wants=NO_STATUS)
+    stage.join(seldom, wants=NO_STATUS, min_interval_s=10.0)
+    none = Socket()
+    stage.join(none, wants=("state",))
     stage.hub.publish_beside("robot", b"robot 1", 0.0)
     assert (usual.wires, seldom.wires) == ([], [])
     stage.publish()
@@ -285,4 +287,4 @@ def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage:
     assert robots == [[b"robot 1", b"robot 2", b"robot 3"], [b"robot 1"]]
     stage.hub.serve_all(10.0)
     assert seldom.wires[-1] == b"robot 3"
-    assert none.beside_due
+    assert not any(b"robot" in it for it in none.wires)

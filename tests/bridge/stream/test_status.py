@@ -8,12 +8,13 @@ from typing import Any, get_args
 import pytest
 
 from lupin_bridge.alarms.board import board_of
-from lupin_bridge.bridge import WATCH_PERIOD_S
+from lupin_bridge.bridge import WATCH_PERIOD_S, current_reports
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge
 from lupin_bridge.judge.verdict import Verdict
-from lupin_bridge.past.fields import quality
-from lupin_bridge.stream import pollers, schema
+from lupin_bridge.past.fields import all_changed, quality
+from lupin_bridge.stream import schema
+from lupin_bridge.stream.estimate_schema import EstimateQualities
 from lupin_bridge.stream.frames import (
     MAX_IN_FRAME,
     STALE_AFTER_S,
@@ -21,12 +22,6 @@ from lupin_bridge.stream.frames import (
     Reason,
     Status,
     alarms_in_frame,
-)
-from lupin_bridge.stream.pollers import (
-    Changed,
-    EstimatePoller,
-    EstimateQualities,
-    changed_of,
 )
 from lupin_bridge.stream.state_json import alarms_body, judgement
 from lupin_twin.core.diagnostics import Condition, JournalState
@@ -40,7 +35,6 @@ from lupin_twin.ros.convert import map_of
 from lupin_twin.runtime.estimates import MAX_SENSORS, Report, TagCheck, sensors_of
 from tests.support.messages import occupancy_grid
 from tests.support.seen import BY_LIGHT, NOW_NS, S, alarm, tag
-from tests.support.waiting import until
 
 
 def update(clock: ClockState = "running", **says: Any) -> TwinUpdate:
@@ -261,19 +255,22 @@ def test_estimates_use_finite_readings_of_pinned_tags_and_changed_ones_are_liste
     )
     assert sensors_of(Snapshot(100, "map", tags)) == ["co2"]
     known = {"co2": report(9, {"a": None, "b": 3}), "light": report(9, {"b": 4, "c": 5})}
-    assert changed_of(known) == {"b": {"co2": 3, "light": 4}, "c": {"light": 5}}
+    assert all_changed(known) == {"b": {"co2": 3, "light": 4}, "c": {"light": 5}}
 
 
 class Stage:
-    """The queries of a poller, and its updates."""
+    """Rounds of reports, and what they show."""
 
     def __init__(self) -> None:
         self.requested: list[str] = []
-        self.reported: list[Changed] = []
-        self.snapshot: Snapshot | None = None
+        self.snapshot = snapshot()
+        self.known: dict[str, Report] = {}
         self.answers: dict[str, Report] = {}
         self.error: Exception = TwinUnavailableError("nobody is there")
-        self.poller = EstimatePoller(self.report_on, lambda: self.snapshot, self.reported.append)
+
+    async def update(self) -> dict[str, dict[str, int]]:
+        self.known = await current_reports(self.snapshot, self.report_on, self.known)
+        return all_changed(self.known)
 
     async def report_on(self, sensor: str, snapshot: Snapshot) -> Report:
         assert snapshot is self.snapshot
@@ -285,20 +282,15 @@ class Stage:
 
 async def test_changes_are_passed_on_in_their_current_form() -> None:
     stage = Stage()
-    await stage.poller.update()
-    assert stage.requested == [], "there is no state yet"
     stage.snapshot = snapshot(co2=5, light=6)
     stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
-    await stage.poller.update()
+    assert await stage.update() == {}
     assert stage.requested == ["co2", "light"]
-    assert stage.reported == [{}]
     stage.answers["co2"] = report(9, {"co2": 5})
     for _ in range(2):
-        await stage.poller.update()
-        assert stage.reported[-1] == {"co2": {"co2": 5}}
+        assert await stage.update() == {"co2": {"co2": 5}}
     stage.snapshot = snapshot(light=6)
-    await stage.poller.update()
-    assert stage.reported[-1] == {}, "no tag has that sensor any more"
+    assert await stage.update() == {}, "no tag has that sensor any more"
 
 
 @pytest.mark.parametrize(
@@ -314,10 +306,9 @@ async def test_where_a_report_fails_the_last_one_holds(error: Exception) -> None
     stage = Stage()
     stage.snapshot, stage.error = snapshot(co2=5, light=6), error
     stage.answers = {"co2": report(9, {"co2": 5}), "light": report(9, {})}
-    await stage.poller.update()
+    await stage.update()
     stage.answers = {"light": report(9, {"light": 6})}
-    await stage.poller.update()
-    assert stage.reported[-1] == {"co2": {"co2": 5}, "light": {"light": 6}}
+    assert await stage.update() == {"co2": {"co2": 5}, "light": {"light": 6}}
 
 
 def test_the_number_of_queried_sensors_is_limited() -> None:
@@ -325,16 +316,5 @@ def test_the_number_of_queried_sensors_is_limited() -> None:
     names = [f"s{number:02}" for number in range(MAX_SENSORS + 1)]
     stage.snapshot = snapshot(**dict.fromkeys(names, 1))
     stage.answers = dict.fromkeys(names, report(9, {}))
-    asyncio.run(stage.poller.update())
+    asyncio.run(stage.update())
     assert stage.requested == names[:-1]
-
-
-async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pollers, "PERIOD_S", 0.0)
-    stage = Stage()
-    stage.snapshot = snapshot(co2=1)
-    stage.poller.start()
-    await until(lambda: len(stage.requested) > 1, "another query")
-    stage.answers = {"co2": report(9, {"co2": 1})}
-    await until(lambda: stage.reported[-1], "the answer")
-    await stage.poller.stop()

@@ -26,7 +26,7 @@ from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
-from lupin_bridge.judge.scans import recent_writes, writes_of
+from lupin_bridge.judge.scans import NO_TAG, recent_writes, writes_of
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import (
     DAY_NS,
@@ -36,11 +36,7 @@ from lupin_twin.core.past import (
     PastWrites,
     RunSpan,
 )
-from lupin_twin.core.state import Observation, Snapshot, TagState
-
-# The run of the clock of all writes that are made from states.
-RUN = 0
-_NO_TAG = TagState("")
+from lupin_twin.core.state import Observation, Snapshot
 
 
 def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[Observation]:
@@ -49,10 +45,10 @@ def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[
     found = [
         write
         for tag in now.tags
-        if (old := known.get(tag.tag_id, _NO_TAG)) is not tag
+        if (old := known.get(tag.tag_id, NO_TAG)) is not tag
         for write in writes_of(old, tag)
     ]
-    return [replace(write, run=RUN, number=number + at) for at, write in enumerate(found)]
+    return [replace(write, number=number + at) for at, write in enumerate(found)]
 
 
 # --- the feed -------------------------------------------------------------------------------------
@@ -72,7 +68,7 @@ UNANSWERED_S: Final = 30.0
 _NOT_RECORDED: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
 # Numbers of writes that are made from states: beyond those of any journal.
 _FIRST_RECEIVED: Final = 2**62
-_ALL_TIME: Final = (RunSpan(RUN, 0, FOREVER_NS),)
+_ALL_TIME: Final = (RunSpan(0, 0, FOREVER_NS),)
 _SILENCES: Final = 100
 _UNREADABLE: Final = (NotRemembered, PastRefused, TwinUnavailableError)
 

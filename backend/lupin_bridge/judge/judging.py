@@ -21,6 +21,7 @@ from zoneinfo import ZoneInfo
 from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.judge.scans import (
+    NO_TAG,
     SHORTEST_NS,
     Patrol,
     RecentScans,
@@ -147,7 +148,6 @@ def unix_s(stamp_ns: int) -> float | None:
 # Readings judged per snapshot, where each tag counts as one more: some 20 ms.
 MAX_AT_ONCE: Final = 6_000
 _UNKNOWN: Final = Health(Verdict.UNKNOWN)
-_NO_TAG: Final = TagState("")
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +300,7 @@ class Judge:
         for tag in snapshot.tags:
             kept = self._tags.get(tag.tag_id)
             if kept is None:
-                kept = self._tags[tag.tag_id] = _Tag(_NO_TAG)
+                kept = self._tags[tag.tag_id] = _Tag(NO_TAG)
             if kept.state is not tag:
                 writes += writes_of(kept.state, tag)
                 kept.state = states[tag.tag_id] = tag

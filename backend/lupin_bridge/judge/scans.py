@@ -1,4 +1,4 @@
-"""Recent scans of each tag, with the day or night and the species of their time; scan intervals.
+"""Recent scans of each tag, with the day or night of their time, and inspections; intervals.
 
 Pure; times are ns of ROS time. For any moment, recent scans are computed from the state and the
 recent log; for states as they come, scan by scan.
@@ -140,12 +140,11 @@ DayOf = Callable[[bool | None, int], Day]
 
 @dataclass(frozen=True, slots=True)
 class Scanned:
-    """One scan: the values of its sensors, and by what they are judged."""
+    """One scan: the values of its sensors, and whether it was day."""
 
     stamp_ns: int
     values: Mapping[str, float]
     is_day: bool = True
-    species: str = ""
 
 
 _stamp_ns = attrgetter("stamp_ns")
@@ -167,10 +166,6 @@ class Recent:
         """Add an inspection; returns whether it is news. For one moment, the last one counts."""
         before = self.looks
         self.looks = tuple(sorted({**dict(before), at_ns: species}.items()))[-INTERVALS - 1 :]
-        if self.looks != before:
-            self.scans = tuple(
-                replace(scan, species=self.species_at(scan.stamp_ns)) for scan in self.scans
-            )
         return self.looks != before
 
     def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> bool:
@@ -178,7 +173,7 @@ class Recent:
         before = bisect_left(self.scans, at_ns, key=_stamp_ns)
         behind = bisect_right(self.scans, at_ns, before, key=_stamp_ns)
         known = self.scans[before].values if before < behind else {}
-        scan = Scanned(at_ns, {**known, **values}, species=self.species_at(at_ns))
+        scan = Scanned(at_ns, {**known, **values})
         # As text, because NaN is not equal to itself.
         if repr(known) == repr(scan.values):
             return False
@@ -240,7 +235,7 @@ class RecentScans:
         """The recent scans of a state; `writes` is the log of them (see `recent_writes`)."""
         found = cls(day_of)
         # Of one moment, the state takes precedence over the log.
-        of_state = (write for tag in tags for write in writes_of(_UNKNOWN, tag))
+        of_state = (write for tag in tags for write in writes_of(NO_TAG, tag))
         found.take(chain(writes, of_state), {tag.tag_id: tag for tag in tags})
         return found
 
@@ -316,7 +311,8 @@ class RecentScans:
         return others
 
 
-_UNKNOWN: Final = TagState("")
+# A tag before anything is known of it.
+NO_TAG: Final = TagState("")
 
 
 def writes_of(before: TagState, tag: TagState) -> list[Observation]:

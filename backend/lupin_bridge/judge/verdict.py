@@ -112,7 +112,7 @@ def judge_tag(
     for reading in readings:
         scan = scans.get(reading.observed_at_ns or 0) or Scanned(0, {})
         sensor = sensors.named(reading.name)
-        ranges = sensor.ranges(is_day=scan.is_day, species=scan.species)
+        ranges = sensor.ranges(is_day=scan.is_day, species=recent.species_at(scan.stamp_ns))
         age_ns = _age_ns(reading.observed_at_ns, now_ns)
         if age_ns is not None and age_ns > FORGOTTEN_NS:
             continue
@@ -202,7 +202,7 @@ def _was_out(
         value = _value_of(scan, reading.name)
         if value is None or not sensor.is_plausible(value):
             continue
-        ranges = sensor.ranges(is_day=scan.is_day, species=scan.species)
+        ranges = sensor.ranges(is_day=scan.is_day, species=recent.species_at(scan.stamp_ns))
         edge = _edge(ranges, verdict, sign)
         if edge is None:
             return False

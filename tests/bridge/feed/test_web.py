@@ -22,6 +22,7 @@ from lupin_bridge.feed.relay import Sample, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.feed.web import RETAINED_S, FollowedLog, WebTwin
 from lupin_bridge.serving.admission import Limits
+from lupin_twin.core import state
 from lupin_twin.core.diagnostics import STATE_TOPIC, Condition, Finding, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
@@ -119,7 +120,7 @@ async def test_after_a_silence_a_new_node_recovers_everything(
                 peer.publish("/twin/state", state_of(value), depth=1)
                 await until(lambda: received() == relayed() == value, "the state, raw too")
                 await until_answered(place, "the robot", lambda x: x == value)
-                scan = Observation("1", 1, {"co2": value}, source="program")
+                scan = state.Observation("1", 1, {"co2": value}, source="program")
                 await twin.publish_observation(scan)
                 await asyncio.to_thread(
                     peer.until,

@@ -14,7 +14,7 @@ from lupin_msgs.msg import Observation as ObservationMsg
 from lupin_msgs.srv import GetEstimateReport
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin.core import ingest, state
+from lupin_twin.core import state
 from lupin_twin.core.diagnostics import ERROR, OK, Finding
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
@@ -127,7 +127,7 @@ def test_the_frame_of_a_flowers_own_pose_takes_precedence(own: str, counts: str)
 def test_kinds_and_status_are_those_of_the_message() -> None:
     assert state.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
     assert state.KIND_FLOWER == ObservationMsg.KIND_FLOWER
-    assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
+    assert state.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY
     assert STATUS_OK == ObservationMsg.STATUS_OK
 
 

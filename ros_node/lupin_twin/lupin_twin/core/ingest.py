@@ -14,6 +14,7 @@ from typing import Final
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected, cut
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import (
+    KIND_ANOMALY,
     KIND_FLOWER,
     KIND_TAG_READING,
     STATUS_OK,
@@ -23,9 +24,6 @@ from lupin_twin.core.state import (
     TwinStore,
     Write,
 )
-
-# lupin_msgs/Observation; the other kinds are in `state`.
-KIND_ANOMALY: Final = 2
 
 # Replaces the `w` of a half turn, which is 0, because 0 stands for no pose.
 HALF_TURN_W: Final = 1e-9

@@ -25,10 +25,11 @@ from lupin_twin.core.drops import (
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
 
-# lupin_msgs/Observation: the kinds of attempts at a tag, and the status of a successful one; the
-# other statuses tell why one failed.
+# lupin_msgs/Observation: its kinds, and the status of a successful attempt; the others tell why one
+# failed.
 KIND_TAG_READING = 0
 KIND_FLOWER = 1
+KIND_ANOMALY = 2
 STATUS_OK = 0
 
 # x, y (m) and a value, in the sensor's unit.

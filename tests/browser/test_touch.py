@@ -143,7 +143,8 @@ def test_charts_are_whole_and_have_one_line_of_tools_and_the_whole_width(phone: 
     add, tags, inside = places(
         phone, ".chart-tags > select:last-of-type", ".chart-tags ul", ".u-over"
     )
-    assert add.right < PHONE["width"] and add.bottom < tags.top
+    assert add.right < PHONE["width"]
+    assert add.bottom < tags.top
     assert tags.bottom - tags.top < 40
     assert inside.right > PHONE["width"] - 30
     # Names of limits are inside a narrow plot.

@@ -24,7 +24,9 @@ test('a timeline says what it lacks', () => {
   expect(timelineOf({ ...wire, kept_from: 105 }, 400)).toEqual({
     from: 100,
     to: 340,
-    bucketS: 1,
+    bucket_s: 1,
+    complete_to: 340,
+    kept_from: 105,
     reach: { from: 20, to: 340.5 },
     buckets: [{ start: 101.5, scans: 5, failures: 1, looks: 2, pests_seen: 3, pests_cleared: 4 }],
     silences: [{ from: 110, to: 120 }],

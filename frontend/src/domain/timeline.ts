@@ -2,25 +2,17 @@
 import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
 import { clockText, minuteText } from './format';
-import type { Shared } from './memo';
 import { countText, dayFormat, type Span } from './time';
 
-export type Timeline = Shared<ReturnType<typeof timelineOf>>;
+/** Without empty buckets; a run is from each start of the twin's clock to the next, as it may begin anew. */
+export interface Timeline extends WireTimeline {
+  readonly missing: readonly Missing[];
+}
 
 /** `nowS`: the twin's time of the answer, ROS seconds. */
-export const timelineOf = (
-  { from, to, bucket_s: bucketS, ...wire }: WireTimeline,
-  nowS: number,
-) => ({
-  ...{ from, to, bucketS },
-  /** The span of the whole history; null: none yet. */
-  reach: wire.reach,
-  /** Sorted by time, without empty buckets. */
-  buckets: wire.buckets,
-  silences: wire.silences,
-  /** From each start of the twin's clock to the next: it may begin anew. */
-  runs: wire.runs as readonly Span[],
-  missing: missingOf({ from, to, ...wire }, nowS),
+export const timelineOf = (wire: WireTimeline, nowS: number): Timeline => ({
+  ...wire,
+  missing: missingOf(wire, nowS),
 });
 
 /** A span in which data may have been received that the answer lacks; not a silence. */

@@ -7,8 +7,8 @@ import type { Timeline } from '../domain/timeline';
 export const timelineWith = (over: Partial<Timeline>): Timeline => ({
   from: 100,
   to: 200,
-  bucketS: 1,
-  reach: { from: 100, to: 200 },
+  bucket_s: 1,
+  ...{ reach: { from: 100, to: 200 }, complete_to: 200, kept_from: 100 },
   buckets: [],
   silences: [],
   runs: [],

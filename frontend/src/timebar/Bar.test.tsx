@@ -58,7 +58,7 @@ test('a pest is no ring, one that is gone is; who needs somebody is on top', () 
     { ...NOTHING, start: 150.5, pests_seen: 1 },
     { ...NOTHING, start: 152, pests_cleared: 1 },
   ];
-  expect(marks(drawn({ bucketS: 0.1, buckets: close }))).toEqual(['pest', 'cleared']);
+  expect(marks(drawn({ bucket_s: 0.1, buckets: close }))).toEqual(['pest', 'cleared']);
 });
 
 test('silences and missing data are hatched, each in its own way', () => {
@@ -83,11 +83,11 @@ test('a clock that began anew is a line of its own', () => {
   const runs = [
     { from: 100, to: 150 },
     { from: 150, to: 200 },
-  ];
+  ].map((run) => ({ ...run, is_simulated: false }));
   expect(marks(drawn({ runs }))).toEqual(['run']);
   expect(marks(drawn({}))).toEqual([]);
   // No stale marks after a first render without width.
-  const timeline = timelineWith({ runs: [...runs, { from: 180, to: 200 }] });
+  const timeline = timelineWith({ runs: [...runs, { from: 180, to: 200, is_simulated: false }] });
   const bar = (width: number): JSX.Element => (
     <Bar axis={{ ...AXIS, width }} timeline={timeline} columns={[]} />
   );

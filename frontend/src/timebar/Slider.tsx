@@ -88,7 +88,7 @@ export function Slider({
 
   const cursor = moment ?? Math.min(nowS, to);
   // The bar ends in a whole bucket: within it, nothing may stand right of "now".
-  const lastIn = timeline && to - nowS < timeline.bucketS ? to : cursor;
+  const lastIn = timeline && to - nowS < timeline.bucket_s ? to : cursor;
   const place = (seconds: number): number => Math.min(width, Math.max(0, xOf(axis, seconds)));
   const isOutside = cursor < from || cursor > to;
   return (

@@ -131,7 +131,7 @@ describe('columns', () => {
   test('no column goes on beyond the end of the bar', () => {
     const { from, to, width } = AXIS;
     const [last] = columnsOf(
-      timelineWith({ buckets: [bucket(to - 1, { scans: 1 })], bucketS: (to - from) / 4 }),
+      timelineWith({ buckets: [bucket(to - 1, { scans: 1 })], bucket_s: (to - from) / 4 }),
       AXIS,
     );
     expect(last?.end).toBe(to);

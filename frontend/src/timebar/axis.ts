@@ -49,7 +49,7 @@ export type Column = ReturnType<typeof columnsOf>[number];
 const height = (count: number, most: number): number =>
   count === 0 ? 0 : Math.max(0.1, Math.sqrt(count / most));
 
-export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis) {
+export function columnsOf({ buckets, bucket_s: bucketS }: Timeline, axis: Axis) {
   const all = buckets.filter(({ start }) => start < axis.to && start + bucketS > axis.from);
   const most = Math.max(1, ...all.map(({ scans, failures }) => Math.max(scans, failures)));
   return all.map((bucket) => {
@@ -79,7 +79,7 @@ export function stretchesOf(spans: readonly Span[], axis: Axis) {
 }
 
 /** Start of each run of the clock except the first, CSS pixels. */
-export function runStarts({ runs }: Timeline, axis: Axis): readonly number[] {
+export function runStarts({ runs }: Pick<Timeline, 'runs'>, axis: Axis): readonly number[] {
   const first = Math.min(...runs.map(({ from }) => from));
   return runs
     .filter(({ from }) => from > first && from > axis.from && from < axis.to)

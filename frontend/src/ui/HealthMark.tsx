@@ -4,15 +4,12 @@ import type { Verdict } from '../contract/types';
 import { MARKS } from '../domain/marks';
 import { S } from '../strings';
 
-/** The mark of a tag's pin: one shape per verdict, so it reads without colour. */
-export function HealthShape({ verdict }: { verdict: Verdict }): JSX.Element {
-  return (
-    <span className="health-mark" data-health={verdict}>
-      <VerdictMark verdict={verdict} />
-    </span>
-  );
-}
+/** The mark of a tag's pin, beside text that says the same. */
+export const HealthShape = ({ verdict }: { verdict: Verdict }): JSX.Element => (
+  <HealthMark verdict={verdict} text="" />
+);
 
+/** One shape per verdict, so that it reads without colour. */
 export function HealthMark({
   verdict,
   word = true,
@@ -23,21 +20,15 @@ export function HealthMark({
   word?: boolean;
   text?: string | undefined;
 }): JSX.Element {
-  return (
-    <span className="health-mark" data-health={verdict}>
-      <VerdictMark verdict={verdict} />
-      <span className={word ? undefined : 'unseen'}>{text}</span>
-    </span>
-  );
-}
-
-function VerdictMark({ verdict }: { verdict: Verdict }): JSX.Element {
   const { outline, sign } = MARKS[verdict];
   return (
-    // The view box leaves room for the stroke.
-    <svg viewBox="-1.2 -1.2 2.4 2.4" width="16" height="16" aria-hidden="true">
-      <path d={outline} className="body" />
-      {sign !== '' && <path d={sign} className="sign" />}
-    </svg>
+    <span className="health-mark" data-health={verdict}>
+      {/* The view box leaves room for the stroke. */}
+      <svg viewBox="-1.2 -1.2 2.4 2.4" width="16" height="16" aria-hidden="true">
+        <path d={outline} className="body" />
+        {sign !== '' && <path d={sign} className="sign" />}
+      </svg>
+      {text !== '' && <span className={word ? undefined : 'unseen'}>{text}</span>}
+    </span>
   );
 }

@@ -260,13 +260,9 @@ function ColouringControl(): JSX.Element {
         legend={S.colouring}
         className="colouring"
         value={colouring}
-        options={(['ideal', 'value'] as const).map((value) => ({
-          value,
-          label: S.colourings[value],
-        }))}
-        onChange={(chosen) => {
-          act({ colouring: chosen });
-        }}
+        options={['ideal', 'value'] as const}
+        text={(each) => S.colourings[each]}
+        onChange={(chosen) => act({ colouring: chosen })}
       />
     </>
   );

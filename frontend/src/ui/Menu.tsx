@@ -3,11 +3,9 @@ import type { JSX, ReactNode } from 'react';
 import { route } from '../contract/api';
 import { signOut } from '../contract/people';
 import { failureText } from '../domain/format';
-import type { TemperatureUnit } from '../domain/sensors';
 import { reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
 import { prefer, useApp } from '../store/app';
 import { person, useSelected } from '../store/create';
-import type { Settings } from '../store/settings';
 import { LANGUAGE, S } from '../strings';
 import { Segmented, useClose } from '../widgets/controls';
 import { LANGUAGE_NAMES, LANGUAGES } from '../words/languages';
@@ -33,23 +31,18 @@ export function Menu(): JSX.Element {
   );
   return (
     <>
-      <Segmented<Settings['theme']>
+      <Segmented
         legend={S.theme}
         value={theme}
-        options={[
-          { value: 'system', label: S.themes.system },
-          { value: 'light', label: S.themes.light },
-          { value: 'dark', label: S.themes.dark },
-        ]}
+        options={['system', 'light', 'dark'] as const}
+        text={(each) => S.themes[each]}
         onChange={(value) => prefer({ theme: value })}
       />
-      <Segmented<TemperatureUnit>
+      <Segmented
         legend={S.unit}
         value={unit}
-        options={[
-          { value: 'C', label: '°C' },
-          { value: 'F', label: '°F' },
-        ]}
+        options={['C', 'F'] as const}
+        text={(each) => `°${each}`}
         onChange={(value) => prefer({ unit: value })}
       />
       <LanguageChoice />

@@ -4,13 +4,14 @@ import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
-import { selectSensors } from '../store/derived';
+import { selectCatalogue, selectSensors } from '../store/derived';
 import { S } from '../strings';
 import { Segmented } from '../widgets/controls';
 
 /** Chooses the sensor that the map shows. */
 export function SensorPicker(): JSX.Element {
   const sensors = useApp(selectSensors);
+  const catalogue = useApp(selectCatalogue);
   const sensor = useApp((state) => state.view.sensor);
   const root = useRef<HTMLDivElement>(null);
   // A link, a shortcut or a narrower window may leave the selected sensor out of view.
@@ -45,20 +46,20 @@ export function SensorPicker(): JSX.Element {
         legend={S.sensors}
         className="sensors"
         value={sensor}
-        options={sensors.map((each) => ({
-          value: each.name,
-          label: (
-            <>
-              <span className="swatch" style={{ background: rgbText(sensorColour(each)) }} />
-              <SensorLabel sensor={each} />
-            </>
-          ),
-        }))}
+        options={sensors.map((each) => each.name)}
+        text={(name) => <Swatch sensor={catalogue.named(name)} />}
         onChange={(name) => act({ sensor: name })}
       />
     </div>
   );
 }
+
+const Swatch = ({ sensor }: { sensor: Sensor }): JSX.Element => (
+  <>
+    <span className="swatch" style={{ background: rgbText(sensorColour(sensor)) }} />
+    <SensorLabel sensor={sensor} />
+  </>
+);
 
 /** Marks the sides where more sensors are out of view. */
 function look(row: HTMLElement): void {

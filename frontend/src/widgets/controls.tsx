@@ -96,19 +96,24 @@ export function More({
   );
 }
 
-interface SegmentedProps<Value extends string> {
-  readonly legend: string;
-  readonly options: readonly { readonly value: Value; readonly label: ReactNode }[];
+interface ChoiceProps<Value, Text> {
   readonly value: Value;
+  readonly options: readonly Value[];
+  readonly text: (option: Value) => Text;
   readonly onChange: (value: Value) => void;
+}
+
+interface SegmentedProps<Value> extends ChoiceProps<Value, ReactNode> {
+  readonly legend: string;
   readonly className?: string;
 }
 
 /** A choice among a few, as native radio buttons, which arrow keys and screen readers support. */
 export function Segmented<Value extends string>({
   legend,
-  options,
   value,
+  options,
+  text,
   onChange,
   className = '',
 }: SegmentedProps<Value>): JSX.Element {
@@ -117,30 +122,23 @@ export function Segmented<Value extends string>({
     <fieldset className={`segmented ${className}`}>
       <legend className="unseen">{legend}</legend>
       {options.map((option) => (
-        <label key={option.value}>
+        <label key={option}>
           <input
             type="radio"
             name={name}
-            value={option.value}
-            checked={option.value === value}
-            onChange={() => onChange(option.value)}
+            value={option}
+            checked={option === value}
+            onChange={() => onChange(option)}
           />
-          <span>{option.label}</span>
+          <span>{text(option)}</span>
         </label>
       ))}
     </fieldset>
   );
 }
 
-interface SelectProps<Value extends string | number> extends Omit<
-  ComponentProps<'select'>,
-  'value' | 'onChange' | 'children'
-> {
-  readonly value: Value;
-  readonly options: readonly Value[];
-  readonly text: (option: Value) => string;
-  readonly onChange: (value: Value) => void;
-}
+type SelectProps<Value> = ChoiceProps<Value, string> &
+  Omit<ComponentProps<'select'>, 'value' | 'onChange' | 'children'>;
 
 /** A choice among more options than fit side by side. */
 export function Select<Value extends string | number>({

@@ -6,7 +6,7 @@ import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectIsDisconnected } from '../../store/moment';
-import { LONGEST_FILTER, type ViewState, withList } from '../../store/view';
+import { LONGEST_FILTER, withList } from '../../store/view';
 import { S } from '../../strings';
 import { Icon, Segmented } from '../../widgets/controls';
 import { HealthShape } from '../HealthMark';
@@ -58,14 +58,12 @@ export function SearchField({
 export function ListChoice(): JSX.Element {
   const list = useApp((state) => state.view.list);
   return (
-    <Segmented<ViewState['list']>
+    <Segmented
       className="list-choice"
       legend={S.listChoice}
       value={list}
-      options={[
-        { value: 'tags', label: S.tags },
-        { value: 'alarms', label: <AlarmsLabel /> },
-      ]}
+      options={['tags', 'alarms'] as const}
+      text={(each) => (each === 'tags' ? S.tags : <AlarmsLabel />)}
       onChange={(chosen) => act(withList(chosen))}
     />
   );

@@ -305,11 +305,14 @@ def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
     archive.do(f"""UPDATE look SET blooms = '[[0, 0, 0, 0, "{lone}", 0, 0]]' WHERE site = 'gh2'""")
     plan = f'{{"frame_id": "{lone}", {origin}, {size}}}'
     archive.do(f"INSERT INTO meta VALUES ('gh2', 'map', '{plan}')")
+    archive.do("UPDATE place SET x = 'NaN' WHERE (site, tag) = ('gh2', '0')")
     with fleet(archive) as running:
         running.site("gh2", is_live=True)
         for path in ("state", "tags/1", f"state?at={int(time.time())}", "report", "map"):
             found = running.http.get(f"/sites/gh2/api/{path}")
             assert (found.status_code, '"?"' in found.text) == (200, True), found.text
+        found = running.http.get("/sites/gh2/api/field?sensor_type=temperature")
+        assert (found.status_code, found.json()["sample_count"]) == (200, 3), found.text
         with psycopg.connect(archive.url("gh2"), autocommit=True) as site:
             for at in ("infinity", "0001-01-01"):
                 site.execute("UPDATE forwarder SET heard_at = %s", (at,))

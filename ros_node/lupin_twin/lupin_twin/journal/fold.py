@@ -7,6 +7,7 @@ The latest row of each series up to then counts; of equal stamps, the one receiv
 from __future__ import annotations
 
 import gc
+import math
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -161,11 +162,13 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> FoldedState
 def _places(
     execute: Any, query: dict[str, Any], first: dict[str, int]
 ) -> tuple[dict[str, Pose], dict[str, int]]:
-    """The pose of each tag, from its first row, and the time from which the tag has one."""
+    """The pose of each tag, from its first finite one, and the time from which it has that."""
     poses: dict[str, Pose] = {}
     placed_ns: dict[str, int] = {}
     numbers: dict[str, int] = {}
     for seq, tag, stamp_ns, _, _, *pose in execute(sql.PLACES, query).fetchall():
+        if not math.isfinite(sum(pose)):  # damage, or a site's own write: it would break each field
+            continue
         if tag not in poses:
             poses[tag], placed_ns[tag], numbers[tag] = Pose(*pose), stamp_ns, seq
         elif stamp_ns < placed_ns[tag]:

@@ -170,14 +170,10 @@ export function reasonText(
     // "Just below 350" names the limit itself, but not what a value back in its range must pass.
     const isNear = reading !== readingText(sensor, reason.value);
     const limit = limitText(reason, (each) => valueText(sensor, each));
-    const text =
-      isNear && reason.release !== undefined
-        ? `${beyondText(sensors, reason)}${ago}`
-        : isNear
-          ? `${label} ${reading}${ago}`
-          : beside.includes(name)
-            ? `${label} ${limit}`
-            : `${label} ${reading}${ago}, ${limit}`;
+    let text = `${label} ${reading}${ago}, ${limit}`;
+    if (isNear && reason.release !== undefined) text = `${beyondText(sensors, reason)}${ago}`;
+    else if (isNear) text = `${label} ${reading}${ago}`;
+    else if (beside.includes(name)) text = `${label} ${limit}`;
     return isMarked ? text : ratedText(text, reason.verdict);
   }
   switch (kind) {

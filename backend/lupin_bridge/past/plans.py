@@ -43,12 +43,7 @@ from lupin_twin.core.past import (
     grid,
     seconds,
 )
-from lupin_twin.core.state import (
-    NANOSECONDS_PER_SECOND,
-    Reading,
-    Snapshot,
-    TagState,
-)
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Snapshot, TagState
 from lupin_twin.journal.counts import Buckets, individually
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG

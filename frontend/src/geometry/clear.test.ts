@@ -151,8 +151,11 @@ describe('labels', () => {
     expect(placeLabels(both, HEIGHT)[0]?.id).toBe('high');
   });
 
-  test('a label does not cover another pin', () => {
-    const [label] = placeLabels([request({}), request({ id: 'b', x: 30, texts: [] })], HEIGHT);
+  test.each([
+    ['does not cover another pin', 30, 0],
+    ['does not stand nearer to another pin than to its own', 40, 20],
+  ])('a label %s', (_, x, y) => {
+    const [label] = placeLabels([request({}), request({ id: 'b', x, y, texts: [] })], HEIGHT);
     expect(label?.x).toBeLessThan(0);
   });
 });

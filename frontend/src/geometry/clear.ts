@@ -102,6 +102,8 @@ export interface Room {
 }
 
 const GAP = 4;
+/** From a label to another tag's pin: nearer, it would seem to be that pin's. */
+const OTHER_GAP = 8;
 /** Lowest priority of a warning. */
 const URGENT = 3;
 const BUCKET = 64;
@@ -112,6 +114,7 @@ export function placeLabels(
   room: Room | null = null,
 ) {
   const taken = new Buckets();
+  const pins = new Buckets();
   const marks = room?.marks ?? [];
   for (const box of [...(room?.covered ?? []), ...marks]) taken.add(box);
   const ordered = requests
@@ -119,15 +122,21 @@ export function placeLabels(
       const { x, y } = request;
       const r = request.radius * 0.8;
       const pin: Box = { left: x - r, top: y - r, right: x + r, bottom: y + r };
-      taken.add(pin);
+      pins.add(pin);
       return { request, index, pin };
     })
     .sort((a, b) => b.request.priority - a.request.priority || a.index - b.index);
 
   return ordered.flatMap(({ request, pin }) => {
     // Among overlapping pins only warnings get labels: more would be unreadable.
-    if (request.priority < URGENT && !taken.isFree(pin, [pin, ...marks])) return [];
-    const spot = firstFree(request, height, taken, room?.within ?? null, marks);
+    const isAlone = pins.isFree(pin, [pin]) && taken.isFree(pin, marks);
+    if (request.priority < URGENT && !isAlone) return [];
+    const isClearOfPins = (box: Box, gap = 0): boolean => pins.isFree(grown(box, gap), [pin]);
+    const isFree = (box: Box): boolean => taken.isFree(box) && isClearOfPins(box, OTHER_GAP);
+    // A warning's value is worth more than a mark, or a place of its own.
+    const isFreeForWarning = (box: Box): boolean => taken.isFree(box, marks) && isClearOfPins(box);
+    const rules = request.priority < URGENT ? [isFree] : [isFree, isFreeForWarning];
+    const spot = firstFree(request, height, room?.within ?? null, rules);
     if (!spot) return [];
     const { text, box, width } = spot;
     taken.add(box);
@@ -137,11 +146,10 @@ export function placeLabels(
 }
 
 function firstFree(
-  { x, y, radius, priority, texts }: LabelRequest,
+  { x, y, radius, texts }: LabelRequest,
   height: number,
-  taken: Buckets,
   sight: Box | null,
-  marks: readonly Box[],
+  rules: readonly ((box: Box) => boolean)[],
 ): { text: string; width: number; box: Box } | null {
   const reach = radius + GAP;
   // From a round pin to a corner of its label.
@@ -161,13 +169,20 @@ function firstFree(
     const boxes = corners
       .map(([left, top]) => ({ left, top, right: left + width, bottom: top + height }))
       .filter((box) => !within || contains(within, box));
-    const box =
-      boxes.find((each) => taken.isFree(each)) ??
-      (priority < URGENT ? undefined : boxes.find((each) => taken.isFree(each, marks)));
-    if (box) return { text, width, box };
+    for (const isFree of rules) {
+      const box = boxes.find(isFree);
+      if (box) return { text, width, box };
+    }
   }
   return null;
 }
+
+const grown = ({ left, top, right, bottom }: Box, by: number): Box => ({
+  left: left - by,
+  top: top - by,
+  right: right + by,
+  bottom: bottom + by,
+});
 
 const contains = (outer: Box, inner: Box): boolean =>
   inner.left >= outer.left &&

@@ -124,7 +124,7 @@ def test_a_row_and_its_pin_mark_each_other_and_the_card_shows_everything(hmi: Hm
     expect(card).to_contain_text("3 pests seen")
     expect(card.locator("[data-sensor=temperature]")).to_contain_text("31.0\u00a0°C")
     expect(card.locator("[data-sensor=temperature]")).to_contain_text("high, daytime ideal")
-    expect(card).to_contain_text("lupin")
+    expect(card).to_contain_text("Lupin")
     expect(card).to_contain_text("x 1.00 m, y 3.00 m")
 
 

@@ -27,8 +27,8 @@ test('no name, no look', () => {
 });
 
 test('a name that the page knows is in its language, in any case; another is shown as it came', () => {
-  expect(['Rose', 'Begonia', 'constructor'].map((name) => speciesText(name))).toEqual([
-    'rose',
+  expect(['ROSE', 'Begonia', 'constructor'].map((name) => speciesText(name))).toEqual([
+    'Rose',
     'Begonia',
     'constructor',
   ]);

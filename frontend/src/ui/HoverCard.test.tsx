@@ -58,7 +58,7 @@ describe('card of the pin under the mouse', () => {
     expect(text).toMatch(
       /Temperature40\.0\u00a0°C too high by 14\.0\u00a0°C \d\u00a0sHumidity60\.0\u00a0% ideal \d\u00a0sCO₂failed +\d\u00a0s/,
     );
-    expect(text).toContain('lupin');
+    expect(text).toContain('Lupin');
     point(null);
     expect(card()).toBeNull();
   });

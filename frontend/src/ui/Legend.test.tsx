@@ -117,7 +117,7 @@ describe('legend', () => {
       );
     expect(parts()).toEqual(['too low', 'night-time ideal per species ', 'too high']);
     expect(at('ideal-species')).toBe(
-      'tulip 8.0\u00a0to\u00a018.0\u00a0°C; others 15.0\u00a0to\u00a024.0\u00a0°C',
+      'Tulip 8.0\u00a0to\u00a018.0\u00a0°C; others 15.0\u00a0to\u00a024.0\u00a0°C',
     );
     flush(() => {
       showTags(

@@ -23,7 +23,7 @@ beforeEach(() => {
     wireTag({
       tag_id: '7',
       readings: readings({ temperature: 9, co2: null, ph: 6.5 }),
-      species: 'tulip',
+      species: 'Tulip',
       species_confidence: 0.8,
       anomaly: true,
       bug_count: 3,
@@ -59,7 +59,7 @@ describe('card', () => {
       'low, daytime ideal',
       'failed',
       '6.5',
-      'tulip',
+      'Tulip',
       '80',
       '12',
     ]) {
@@ -85,7 +85,7 @@ describe('card', () => {
     render(<TagCard tagId="7" />);
     expect(document.querySelector('.card-ideal')?.textContent).toContain('18.0\u00a0to\u00a026.0');
     expect(screen.getByRole('complementary').textContent).toContain(
-      'tulip 49\u00a0% certain (uncertain)',
+      'Tulip 49\u00a0% certain (uncertain)',
     );
   });
 

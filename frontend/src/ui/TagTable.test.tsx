@@ -113,10 +113,10 @@ describe('table', () => {
     // Blank to the eye: `.unseen`.
     expect(cell('9', 'co2')).toBe('No sensor');
     expect(cell('10', 'temperature')).toBe('high Temperature above 35.0\u00a0°C: 40.0');
-    expect(row('9').textContent).toContain('rose91');
+    expect(row('9').textContent).toContain('Rose91');
     // Below the name where the column has no room; without a species there is nothing to say.
     const below = ['9', '10'].map((id) => row(id).querySelector('.row-species')?.textContent);
-    expect(below).toEqual(['rose', undefined]);
+    expect(below).toEqual(['Rose', undefined]);
     expect(row('10').dataset['health']).toBe('critical');
     expect(row('2').dataset['health']).toBe('unknown');
     const why = row('9').querySelector('.cell-health');

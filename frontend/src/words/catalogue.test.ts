@@ -113,6 +113,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
     ...['phase.live', 'keys.time.3.1', 'themes.system', 'attemptOutcomes.ok', 'sensors'],
     ...['cardPosition', 'saveCsvShort', 'legendMore'],
     ...['keys.global.9.0', 'idealParts.any', 'colourings.ideal'],
+    ...['speciesNames.gerbera', 'speciesNames.rose'],
   ],
   nl: [
     ...['phase.live', 'keys.time.3.1', 'menu', 'attemptOutcomes.ok', 'sensors', 'alarmCount'],

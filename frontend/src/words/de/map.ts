@@ -153,7 +153,7 @@ export const TAGS: In<typeof EN.TAGS> = {
     cucumber: 'Gurke',
     strawberry: 'Erdbeere',
   },
-  unclassified: 'nicht bestimmt',
+  unclassified: 'Nicht bestimmt',
   tableButton: 'Spalten und Zeilen',
   tableColumns: 'Spalten',
   tableByArea: 'Nach Bereich gruppieren',
@@ -200,7 +200,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartFailed: (reason) =>
     `Frühere Daten konnten nicht geladen werden (${reason}); die Seite versucht es weiter.`,
   chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine früheren Daten.',
-  chartIdealsDiffer: 'Idealbereiche je nach Art verschieden',
+  chartIdealsDiffer: 'Idealbereich je nach Art',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
   chartTable: 'Als Tabelle anzeigen',
   chartPlots: 'Als Verlauf anzeigen',

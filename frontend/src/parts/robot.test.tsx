@@ -5,7 +5,7 @@ import { moveViewport } from '../store/app';
 import { marksOnMap, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { extended, RobotFact, RobotLayer, robotText, trailPath } from './robot';
+import { extended, joined, RobotFact, RobotLayer, robotText, trailPath } from './robot';
 
 const time = (sec: number): number => sec;
 const robot = {
@@ -95,4 +95,9 @@ test('the trail is the last hour, by what is apart; a clock that went back drops
   expect(trail.map(({ x }) => x)).toEqual([1, 2, 9]);
   expect(trailPath(trail), 'broken where the way is unknown').toBe('M1 0L2 0M9 0');
   expect(extended(trail, at(9, 1)).map(({ x }) => x)).toEqual([1, 9]);
+  const fetched = joined([at(0, 0), at(1, 1)], [at(1, 1), at(2, 2)]);
+  expect(
+    fetched.map(({ x }) => x),
+    'with what was received meanwhile',
+  ).toEqual([0, 1, 2]);
 });

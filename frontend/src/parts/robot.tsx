@@ -155,7 +155,7 @@ function useTrail(): readonly Point[] {
   useEffect(() => {
     const gone = new AbortController();
     keepFetched<Robot>(
-      { paceMs: PACE_MS, onValue: (robot) => setTrail(robot.trail) },
+      { paceMs: PACE_MS, onValue: ({ trail }) => setTrail((last) => joined(trail, last)) },
       ({ twin }) =>
         twin.connection.socket.kind === 'open'
           ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
@@ -186,6 +186,12 @@ export function extended(trail: readonly Point[], next: Point): readonly Point[]
   const ageOfPoint = (it: Point): number => next.observed_at - it.observed_at;
   if (last && ageOfPoint(last) >= 0 && apart(last, next) < STEP_M) return trail;
   return [...trail.filter((it) => ageOfPoint(it) >= 0 && ageOfPoint(it) <= TRAIL_S), next];
+}
+
+/** A fetched trail, with the positions received while it was fetched. */
+export function joined(fetched: readonly Point[], received: readonly Point[]): readonly Point[] {
+  const end = fetched.at(-1)?.observed_at ?? Infinity;
+  return [...fetched, ...received.filter((it) => it.observed_at > end)];
 }
 
 /** The trail as an SVG path in metres, with a break where the way is unknown. */

@@ -261,6 +261,13 @@ def test_on_a_dark_phone_it_is_light_and_only_a_wide_table_scrolls(
         assert left[0] == left[2] < left[1] == left[3], "two in a row"
         colour = page.locator("body").evaluate("it => getComputedStyle(it).backgroundColor")
         assert colour == "rgb(255, 255, 255)"
+        # Below a heading a time is the second cell: it stays whole, as the names above may not.
+        lines = """cells => cells.map((it) => {
+          const range = document.createRange();
+          range.selectNodeContents(it);
+          return range.getClientRects().length; })"""
+        times = page.locator("table.alarms [colspan] + td")
+        assert set(times.evaluate_all(lines)) == {1}
 
 
 def test_on_a_phone_an_alarm_has_room(greenhouse: Bridge, browser: Browser) -> None:

@@ -77,6 +77,20 @@ def test_an_alarm_appears_is_acknowledged_and_resolved(domain: int, open_page: O
         expect(hmi.page).to_have_title("(1) Lupin twin")
         expect(hmi.test_id("announced-critical")).to_contain_text("New: Tag a: Temperature above")
         expect(row).to_have_attribute("data-acknowledged", "false")
+        # A long value leaves the text beside it uncovered.
+        hmi.resize(1024, 768)
+        gap = """row => {
+          const [text, value] = ['.alarm-text > :first-child', '[data-fact=now] > :first-child']
+            .map((each) => row.querySelector(each));
+          const range = document.createRange();
+          const box = (it) => (range.selectNodeContents(it), range.getBoundingClientRect());
+          const { textContent } = value;
+          value.textContent = 'now just below a limit of 18.0 °C, and more';
+          const room = box(value).left - box(text).right;
+          value.textContent = textContent;
+          return room; }"""
+        assert row.evaluate(gap) >= 0
+        hmi.resize(**WIDE)
 
         hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
         expect(row).to_have_attribute("data-acknowledged", "true")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from functools import lru_cache
 from operator import attrgetter
 from sys import intern
@@ -132,11 +131,17 @@ def noted_number(log: SiteLog, key: str, otherwise: int = 0) -> int:
         DamagedFile: something else is noted.
 
     """
-    text = log.meta(key) or str(otherwise)
-    with suppress(ValueError):
-        if abs(found := int(text)) <= FOREVER_NS:
-            return found
-    raise DamagedFile(f"{key} in the journal is {text[:64]!r}, which is not a number")
+    text = log.meta(key)
+    if text is None:
+        return otherwise
+    if not is_number(text):
+        raise DamagedFile(f"{key} in the journal is {text[:64]!r}, which is not a number")
+    return int(text)
+
+
+def is_number(text: str) -> bool:
+    """Whether it is a number that can be noted: a time, ns of ROS time, or the number of a row."""
+    return text.isdecimal() and len(text) < 20 and int(text) <= FOREVER_NS // 2
 
 
 def numbers_of(texts: Sequence[str]) -> list[list[float]]:

@@ -15,8 +15,8 @@ export function inSeconds(value: unknown): unknown {
   if (typeof sec === 'number' && typeof nanosec === 'number') return sec + nanosec / 1e9;
   const parts = value as Record<string, unknown>;
   for (const key of Object.keys(parts)) {
-    const part = inSeconds(parts[key]);
-    if (part !== parts[key]) parts[key] = part;
+    const part = parts[key];
+    if (typeof part === 'object') parts[key] = inSeconds(part);
   }
   return value;
 }

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from operator import attrgetter
-from sys import intern
 from typing import Any, Final
 
 from lupin_twin.core.drops import valid_text
@@ -101,11 +100,11 @@ def listed_rows(
 def scans_of(rows: Sequence[Sequence[Any]]) -> list[Observation]:
     """Rows of `scan`: scans, and attempts of either kind that failed."""
     every = named_numbers((row[0] for row in rows), [row[1] for row in rows])
-    found = []
+    found, same = [], dict[str, str]()
     for row, (names, values) in zip(rows, every, strict=True):
         _, _, tag, stamp_ns, status, detail, source, own_ns, mission, *of, seq, run = row
-        # Many rows name few tags, sources and missions.
-        tag, source, mission = map(intern, (tag, source, mission))
+        # Many rows name few tags, sources and missions. Python 3.12 never forgets what is interned.
+        tag, source, mission = (same.setdefault(it, it) for it in (tag, source, mission))
         reported = (None, status, detail, source, own_ns, mission, *of, None, seq, run)
         found.append(Observation(tag, stamp_ns, dict(zip(names, values, strict=True)), *reported))
     return found

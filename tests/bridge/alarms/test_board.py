@@ -414,7 +414,9 @@ def after(store: TwinStore, *writes: Observation) -> Snapshot:
 def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> None:
     store = TwinStore()
     pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
-    drawn = replace(pest, blooms=(Bloom(1, 2, 3, 1, "tulip", 0.9, anomaly=False),), footprint=((1, 2, 3),))
+    drawn = replace(
+        pest, blooms=(Bloom(1, 2, 3, 1, "tulip", 0.9, anomaly=False),), footprint=((1, 2, 3),)
+    )
     first = after(
         store,
         Observation("a", 5, {"co2": 400.0, "light": 1.0}),

@@ -111,9 +111,8 @@ def _structure(connection: sqlite3.Connection) -> Iterator[str]:
         " AND b.run = a.joins WHERE a.joins IS NOT NULL AND b.run IS NULL"
     ).fetchall():
         yield f"run {number} joins run {joins}, which is missing"
-    for key, value in connection.execute(
-        "SELECT key, value FROM meta WHERE key GLOB '*_seq' OR key GLOB '*_ns*'"
-    ).fetchall():
+    facts = "SELECT key, value FROM meta WHERE key GLOB '*_seq' OR key GLOB '*_ns*'"
+    for key, value in connection.execute(facts).fetchall():
         if not is_number(str(value)):
             yield f"{key} is {value!r}, which is not a number"
 

@@ -333,11 +333,7 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
     # Then count the other rows: whether their pests are new depends on what was before.
     counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(log).items()}
     count_rows(log, after, lot.last, counted_ns)
-    delete_up_to(connection, _purged_seq(connection))
-
-
-def _purged_seq(connection: sqlite3.Connection) -> int:
-    return noted_number(SiteLog(connection), PURGED_SEQ)
+    delete_up_to(connection, noted_number(log, PURGED_SEQ))
 
 
 def _purged(log: SiteLog, *, every: bool = False) -> dict[int, int]:
@@ -347,7 +343,7 @@ def _purged(log: SiteLog, *, every: bool = False) -> dict[int, int]:
 def _gone_seq(connection: sqlite3.Connection) -> int:
     """The number up to which counted rows were deleted: by age, by size, or forgotten."""
     forgotten = (int(str(record["seq"])) for record in records(connection))
-    return max(_purged_seq(connection), *forgotten, 0)
+    return max(noted_number(SiteLog(connection), PURGED_SEQ), 0, *forgotten)
 
 
 def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:

@@ -131,11 +131,9 @@ def noted_number(log: SiteLog, key: str, otherwise: int = 0) -> int:
 
     """
     text = log.meta(key)
-    if text is None:
-        return otherwise
-    if not is_number(text):
-        raise DamagedFile(f"{key} in the journal is {text[:64]!r}, which is not a number")
-    return int(text)
+    if text is None or is_number(text):
+        return otherwise if text is None else int(text)
+    raise DamagedFile(f"{key} in the journal is {text[:64]!r}, which is not a number")
 
 
 def is_number(text: str) -> bool:

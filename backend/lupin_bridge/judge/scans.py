@@ -331,7 +331,8 @@ def writes_of(before: TagState, tag: TagState) -> list[Observation]:
     found = [Observation(tag.tag_id, at_ns, values) for at_ns, values in scans.items()]
     looked_ns, flower, last = tag.looked_at_ns, tag.flower, tag.last_try
     if looked_ns is not None and (looked_ns, flower) != (before.looked_at_ns, before.flower):
-        found.append(Observation(tag.tag_id, looked_ns, kind=KIND_FLOWER, flower=flower))
+        bare = replace(flower, blooms=(), footprint=())  # for who keeps it: they may be thousands
+        found.append(Observation(tag.tag_id, looked_ns, kind=KIND_FLOWER, flower=bare))
     if last is not None and last.status != STATUS_OK and last != before.last_try:
         found.append(Observation(tag.tag_id, last.stamp_ns, status=last.status))
     return sorted(found, key=_stamp_ns)

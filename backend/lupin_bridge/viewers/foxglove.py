@@ -28,7 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lupin_bridge.feed.relay import Feed, Sample, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.feed.tasks import Shared
+from lupin_bridge.feed.tasks import Guard, Shared
 from lupin_bridge.serving.ws_protocol import members_of, model_of, shown
 from lupin_twin.core import interfaces
 from lupin_twin.core.interfaces import Topic
@@ -238,11 +238,12 @@ class Offer:
         self._ids = count(1)
         self._looked_s = -math.inf
         self._looking: Shared[None] = Shared()
+        self._guard = Guard("foxglove's layers are unchanged")
 
     async def look(self) -> None:
         """Bring the channels up to date; all clients share the looks."""
         if time.monotonic() >= self._looked_s + FRESH_S:
-            await self._looking.get("look", self._look)
+            await self._guard.run(self._looking.get("look", self._look))
 
     async def _look(self) -> None:
         names = self._source.names

@@ -75,9 +75,10 @@ test.each([
   expect(parse(frame)).toEqual({ kind: 'frame', frame });
 });
 
-test('a stamp of the wire becomes seconds', () => {
-  const wire = { ...delta, header: { ...header, stamp: { sec: 12, nanosec: 250_000_000 } } };
-  const frame = { ...delta, header: { ...header, stamp: 12.25 } };
+test('a stamp of the wire becomes seconds, tags with the names of its parts stay', () => {
+  const tags = { sec: health.house, nanosec: health.house };
+  const wire = { ...delta, tags, header: { ...header, stamp: { sec: 12, nanosec: 250_000_000 } } };
+  const frame = { ...delta, tags, header: { ...header, stamp: 12.25 } };
   expect(parse(wire)).toEqual({ kind: 'frame', frame });
 });
 

@@ -12,11 +12,11 @@ export type InSeconds<Wire> = Wire extends Stamp
 export function inSeconds(value: unknown): unknown {
   if (typeof value !== 'object' || value === null) return value;
   const { sec, nanosec } = value as Partial<Stamp>;
-  if (sec !== undefined && nanosec !== undefined) return sec + nanosec / 1e9;
+  if (typeof sec === 'number' && typeof nanosec === 'number') return sec + nanosec / 1e9;
   const parts = value as Record<string, unknown>;
   for (const key of Object.keys(parts)) {
-    const part = inSeconds(parts[key]);
-    if (part !== parts[key]) parts[key] = part;
+    const part = parts[key];
+    if (typeof part === 'object') parts[key] = inSeconds(part);
   }
   return value;
 }

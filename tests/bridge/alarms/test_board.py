@@ -33,7 +33,7 @@ from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, WITHDRAW, Note
 from lupin_twin.core.past import PastWrites, RunSpan, WritesRequest
-from lupin_twin.core.state import Flower, Observation, Snapshot, TwinStore
+from lupin_twin.core.state import Bloom, Flower, Observation, Snapshot, TwinStore
 from lupin_twin.runtime.workers import Workers
 from tests.support.seen import Alarms, alarm
 from tests.support.store import logged
@@ -414,10 +414,13 @@ def after(store: TwinStore, *writes: Observation) -> Snapshot:
 def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> None:
     store = TwinStore()
     pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
+    drawn = replace(
+        pest, blooms=(Bloom(1, 2, 3, 1, "tulip", 0.9, anomaly=False),), footprint=((1, 2, 3),)
+    )
     first = after(
         store,
         Observation("a", 5, {"co2": 400.0, "light": 1.0}),
-        Observation("a", 4, kind=1, flower=pest),
+        Observation("a", 4, kind=1, flower=drawn),
         Observation("b", 6, status=2),
     )
     reported = writes_between(None, first, 7)

@@ -288,3 +288,13 @@ def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage:
     stage.hub.serve_all(10.0)
     assert seldom.wires[-1] == b"robot 3"
     assert not any(b"robot" in it for it in none.wires)
+
+
+def test_a_client_that_wants_states_again_has_skipped_none_meanwhile(stage: Stage) -> None:
+    socket = Socket()
+    client = stage.join(socket, wants=("state",))
+    numbers = [stage.publish()]
+    stage.hub.want(client, (), 0.0)
+    numbers += [stage.publish(), stage.publish()]
+    stage.hub.want(client, KINDS[1:2], 0.0)
+    assert (socket.got, stage.hub.frames_skipped) == ([numbers[0], numbers[2]], 0)

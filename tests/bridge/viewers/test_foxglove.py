@@ -99,7 +99,7 @@ async def test_layers_are_bounded_and_end_with_ros(monkeypatch: pytest.MonkeyPat
     assert topics(offer) == OWN
 
 
-async def test_clients_share_a_look_and_an_id_is_never_reused(
+async def test_clients_share_a_look_that_may_fail_and_an_id_is_never_reused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     layer = "/n/twin/field/a"
@@ -109,6 +109,10 @@ async def test_clients_share_a_look_and_an_id_is_never_reused(
         await offer.look()
     assert source.looks == 1
     monkeypatch.setattr(module, "FRESH_S", 0.0)
+    source.fault = RuntimeError("no such node")
+    await offer.look()
+    assert topics(offer) == [*OWN, layer]
+    source.fault = None
     del source.now_published[layer]
     await offer.look()
     assert topics(offer) == OWN

@@ -101,7 +101,7 @@ def test_a_lot_changes_the_name_of_no_journal(tmp_path: Path) -> None:
     assert follow.write(tmp_path / "web.sqlite", lot, NOW).journal == lot.journal
 
 
-@pytest.mark.parametrize("key", ["purged_ns:1", "purged_seq", "forgotten:1"])
+@pytest.mark.parametrize("key", ["purged_ns:1", "purged_seq", "forgotten:1", "followed_seq"])
 def test_a_copy_that_says_nonsense_of_itself_is_damaged(
     key: str, source: Path, tmp_path: Path
 ) -> None:
@@ -111,6 +111,11 @@ def test_a_copy_that_says_nonsense_of_itself_is_damaged(
         set_meta(connection, key, "x")
     with pytest.raises(DamagedFile, match="nonsense"):
         follow.followed(target)
+    if key == "followed_seq":
+        with reading(source) as connection:
+            lot = follow.read(connection, 0, 7)
+        with pytest.raises(DamagedFile, match="followed_seq in the journal is 'x'"):
+            follow.write(target, lot, NOW)
 
 
 @pytest.mark.parametrize("said", ["x", "nan", "-5", "0", "1e-300", "inf", "1e300"])

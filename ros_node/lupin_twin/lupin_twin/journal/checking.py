@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.journal.counts import extent
-from lupin_twin.journal.rows import sensor_names
+from lupin_twin.journal.rows import is_number, sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
@@ -111,11 +111,10 @@ def _structure(connection: sqlite3.Connection) -> Iterator[str]:
         " AND b.run = a.joins WHERE a.joins IS NOT NULL AND b.run IS NULL"
     ).fetchall():
         yield f"run {number} joins run {joins}, which is missing"
-    for key, value in connection.execute(
-        "SELECT key, value FROM meta WHERE (key GLOB '*_seq' OR key GLOB '*_ns*')"
-        " AND value GLOB '*[^0-9]*'"
-    ).fetchall():
-        yield f"{key} is {value!r}, which is not a number"
+    facts = "SELECT key, value FROM meta WHERE key GLOB '*_seq' OR key GLOB '*_ns*'"
+    for key, value in connection.execute(facts).fetchall():
+        if not is_number(str(value)):
+            yield f"{key} is {value!r}, which is not a number"
 
 
 def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Iterator[str]:

@@ -34,7 +34,7 @@ from lupin_twin.journal.retention import (
     kept,
     records,
 )
-from lupin_twin.journal.rows import last_row
+from lupin_twin.journal.rows import last_row, noted_number
 from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -230,7 +230,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 # Overrides what the rows say: the file is named by it.
                 set_meta(connection, "journal_id", lot.journal)
                 _followed(connection)
-                gone, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
+                gone, begun = _gone_seq(connection), noted_number(SiteLog(connection), _BEGUN)
             except _UNUSABLE as error:
                 raise NotALotError(f"rows that are not those of a log: {error}") from error
             # A journal that was restored from a backup gives the same numbers to other rows.
@@ -272,14 +272,14 @@ def _followed(connection: sqlite3.Connection) -> Followed:
         log.journal_id,
         _last(connection),
         world_of(log),
-        int(log.meta(_COMPLETE) or 0) or last_row(log)[1],
+        noted_number(log, _COMPLETE) or last_row(log)[1],
         kept(connection),
         simulated(connection),
     )
 
 
 def _last(connection: sqlite3.Connection) -> int:
-    return int(get_meta(connection, _FOLLOWED) or 0)
+    return noted_number(SiteLog(connection), _FOLLOWED)
 
 
 # --- reading a journal ----------------------------------------------------------------------------
@@ -333,11 +333,7 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
     # Then count the other rows: whether their pests are new depends on what was before.
     counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(log).items()}
     count_rows(log, after, lot.last, counted_ns)
-    delete_up_to(connection, _purged_seq(connection))
-
-
-def _purged_seq(connection: sqlite3.Connection) -> int:
-    return int(get_meta(connection, PURGED_SEQ) or 0)
+    delete_up_to(connection, noted_number(log, PURGED_SEQ))
 
 
 def _purged(log: SiteLog, *, every: bool = False) -> dict[int, int]:
@@ -347,7 +343,7 @@ def _purged(log: SiteLog, *, every: bool = False) -> dict[int, int]:
 def _gone_seq(connection: sqlite3.Connection) -> int:
     """The number up to which counted rows were deleted: by age, by size, or forgotten."""
     forgotten = (int(str(record["seq"])) for record in records(connection))
-    return max(_purged_seq(connection), *forgotten, 0)
+    return max(noted_number(SiteLog(connection), PURGED_SEQ), 0, *forgotten)
 
 
 def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from functools import lru_cache
 from operator import attrgetter
-from sys import intern
 from typing import Any, Final
 
 from lupin_twin.core.drops import valid_text
@@ -102,11 +100,11 @@ def listed_rows(
 def scans_of(rows: Sequence[Sequence[Any]]) -> list[Observation]:
     """Rows of `scan`: scans, and attempts of either kind that failed."""
     every = named_numbers((row[0] for row in rows), [row[1] for row in rows])
-    found = []
+    found, same = [], dict[str, str]()
     for row, (names, values) in zip(rows, every, strict=True):
         _, _, tag, stamp_ns, status, detail, source, own_ns, mission, *of, seq, run = row
-        # Many rows name few tags, sources and missions.
-        tag, source, mission = map(intern, (tag, source, mission))
+        # Many rows name few tags, sources and missions. Python 3.12 never forgets what is interned.
+        tag, source, mission = (same.setdefault(it, it) for it in (tag, source, mission))
         reported = (None, status, detail, source, own_ns, mission, *of, None, seq, run)
         found.append(Observation(tag, stamp_ns, dict(zip(names, values, strict=True)), *reported))
     return found
@@ -132,11 +130,15 @@ def noted_number(log: SiteLog, key: str, otherwise: int = 0) -> int:
         DamagedFile: something else is noted.
 
     """
-    text = log.meta(key) or str(otherwise)
-    with suppress(ValueError):
-        if abs(found := int(text)) <= FOREVER_NS:
-            return found
+    text = log.meta(key)
+    if text is None or is_number(text):
+        return otherwise if text is None else int(text)
     raise DamagedFile(f"{key} in the journal is {text[:64]!r}, which is not a number")
+
+
+def is_number(text: str) -> bool:
+    """Whether it is a number that can be noted: a time, ns of ROS time, or the number of a row."""
+    return text.isdecimal() and len(text) < 20 and int(text) <= FOREVER_NS // 2
 
 
 def numbers_of(texts: Sequence[str]) -> list[list[float]]:

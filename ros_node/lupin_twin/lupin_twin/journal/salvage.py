@@ -23,6 +23,7 @@ from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.checking import delete_wrong
 from lupin_twin.journal.counts import DELETED, count_rows
+from lupin_twin.journal.rows import is_number
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     HOURS_OF_LISTS,
@@ -322,13 +323,13 @@ def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> 
     purged, largest = {}, size // _LEAST_ROW_BYTES
     for _, key, value in _both_ends(old, _ALL.format("meta"), "key"):
         run = str(key).removeprefix(DELETED)
-        if key in (LAST_SEQ, PURGED_SEQ) and str(value).isdecimal():
+        is_sound = is_number(str(value))
+        if key in (LAST_SEQ, PURGED_SEQ) and is_sound:
             largest = max(largest, int(value))
-        if run != key and run.isdecimal() and str(value).isdecimal():
+        if run != key and is_number(run) and is_sound:
             # The whole hour is counted already.
             purged[int(run)] = (int(value) // HOUR_NS + 1) * HOUR_NS - 1
-        is_number = key == PURGED_SEQ or "_ns" in str(key)
-        is_sound = not is_number or str(value).isdecimal()
+        is_sound |= key != PURGED_SEQ and "_ns" not in str(key)
         if is_sound and key not in ("journal_id", SALVAGE, LAST_SEQ):
             set_meta(new, key, value)
     # New numbers are past those of all rows that may have been lost at the end.

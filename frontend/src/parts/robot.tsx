@@ -47,6 +47,7 @@ export function RobotLayer(): ReactPortal | null {
       <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-freshness={looks}>
         <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
           <path className="robot-trail" d={trailPath(trail)} />
+          <path className="robot-recent" d={trailPath(trail.slice(-RECENT_POINTS))} />
           {plan && (
             <polyline
               className="robot-plan"
@@ -173,6 +174,8 @@ function useTrail(): readonly Point[] {
 
 type Point = Robot['trail'][number];
 
+/** About the last round. */
+const RECENT_POINTS = 40;
 /** Age of the oldest point, s. */
 const TRAIL_S = 3_600;
 /** Least distance between two points, as in the bridge, m. */

@@ -16,14 +16,15 @@ const REACH_PX = 21;
 
 export function isClear(view: View, point: MapPoint, covered: readonly Box[]): boolean {
   const { x, y } = toCanvas(view, point);
-  return covered.every(
-    ({ left, top, right, bottom }) =>
-      x <= left - REACH_PX ||
-      x >= right + REACH_PX ||
-      y <= top - REACH_PX ||
-      y >= bottom + REACH_PX,
-  );
+  const pin = { left: x, top: y, right: x, bottom: y };
+  return covered.every((box) => areApart(pin, box, REACH_PX));
 }
+
+const areApart = (a: Box, b: Box, gap: number): boolean =>
+  a.right + gap <= b.left ||
+  b.right + gap <= a.left ||
+  a.bottom + gap <= b.top ||
+  b.bottom + gap <= a.top;
 
 /**
  * The view that shows all of `bounds` with no pin below a covered box: otherwise the largest of the
@@ -192,13 +193,7 @@ class Buckets {
   isFree(box: Box, ignored: readonly Box[] = [], gap = 0): boolean {
     for (const key of keys(box, gap)) {
       for (const other of this.#boxes.get(key) ?? []) {
-        const apart =
-          ignored.includes(other) ||
-          box.right + gap <= other.left ||
-          other.right + gap <= box.left ||
-          box.bottom + gap <= other.top ||
-          other.bottom + gap <= box.top;
-        if (!apart) return false;
+        if (!ignored.includes(other) && !areApart(box, other, gap)) return false;
       }
     }
     return true;

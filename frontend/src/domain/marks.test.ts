@@ -26,10 +26,10 @@ test('no name, no look', () => {
   expect(speciesLooks(['', 'rose']).has('')).toBe(false);
 });
 
-test('a name that the page knows is in its language, in any case; another is shown as it came', () => {
-  expect(['ROSE', 'Begonia', 'constructor'].map((name) => speciesText(name))).toEqual([
+test('a name that the page knows is in its language, in any case; another begins with a capital too', () => {
+  expect(['ROSE', 'begonia', 'constructor'].map((name) => speciesText(name))).toEqual([
     'Rose',
     'Begonia',
-    'constructor',
+    'Constructor',
   ]);
 });

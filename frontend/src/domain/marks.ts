@@ -73,9 +73,10 @@ function hash(text: string): number {
   return value >>> 0;
 }
 
-/** A species in the reader's language, safe to show; without a translation, as received. */
+/** A species in the reader's language, safe to show; without a translation, as received, with a capital. */
 export function speciesText(name: string, longest?: number): string {
   const names: Readonly<Record<string, string>> = S.speciesNames;
   const known = name.toLowerCase();
-  return shown((Object.hasOwn(names, known) ? names[known] : undefined) ?? name, longest);
+  const own = (Object.hasOwn(names, known) ? names[known] : undefined) ?? name;
+  return shown(own.charAt(0).toUpperCase() + own.slice(1), longest);
 }

@@ -16,14 +16,15 @@ const REACH_PX = 21;
 
 export function isClear(view: View, point: MapPoint, covered: readonly Box[]): boolean {
   const { x, y } = toCanvas(view, point);
-  return covered.every(
-    ({ left, top, right, bottom }) =>
-      x <= left - REACH_PX ||
-      x >= right + REACH_PX ||
-      y <= top - REACH_PX ||
-      y >= bottom + REACH_PX,
-  );
+  const pin = { left: x, top: y, right: x, bottom: y };
+  return covered.every((box) => areApart(pin, box, REACH_PX));
 }
+
+const areApart = (a: Box, b: Box, gap: number): boolean =>
+  a.right + gap <= b.left ||
+  b.right + gap <= a.left ||
+  a.bottom + gap <= b.top ||
+  b.bottom + gap <= a.top;
 
 /**
  * The view that shows all of `bounds` with no pin below a covered box: otherwise the largest of the
@@ -96,7 +97,7 @@ export interface Room {
   readonly covered: readonly Box[];
   /**
    * The robot's and other marks: labels keep clear of them, but a pin below one still has its label, and
-   * a warning's value is worth more than a mark.
+   * a warning's value is worth more than a mark, or a distance to other pins.
    */
   readonly marks?: readonly Box[];
 }
@@ -113,8 +114,7 @@ export function placeLabels(
   height: number,
   room: Room | null = null,
 ) {
-  const taken = new Buckets();
-  const pins = new Buckets();
+  const [taken, pins] = [new Buckets(), new Buckets()];
   const marks = room?.marks ?? [];
   for (const box of [...(room?.covered ?? []), ...marks]) taken.add(box);
   const ordered = requests
@@ -129,13 +129,10 @@ export function placeLabels(
 
   return ordered.flatMap(({ request, pin }) => {
     // Among overlapping pins only warnings get labels: more would be unreadable.
-    const isAlone = pins.isFree(pin, [pin]) && taken.isFree(pin, marks);
-    if (request.priority < URGENT && !isAlone) return [];
-    const isClearOfPins = (box: Box, gap = 0): boolean => pins.isFree(grown(box, gap), [pin]);
-    const isFree = (box: Box): boolean => taken.isFree(box) && isClearOfPins(box, OTHER_GAP);
-    // A warning's value is worth more than a mark, or a place of its own.
-    const isFreeForWarning = (box: Box): boolean => taken.isFree(box, marks) && isClearOfPins(box);
-    const rules = request.priority < URGENT ? [isFree] : [isFree, isFreeForWarning];
+    const isUrgent = request.priority >= URGENT;
+    if (!isUrgent && !(pins.isFree(pin, [pin]) && taken.isFree(pin, marks))) return [];
+    const rules = [(box: Box) => taken.isFree(box) && pins.isFree(box, [pin], OTHER_GAP)];
+    if (isUrgent) rules.push((box) => taken.isFree(box, marks) && pins.isFree(box));
     const spot = firstFree(request, height, room?.within ?? null, rules);
     if (!spot) return [];
     const { text, box, width } = spot;
@@ -169,20 +166,11 @@ function firstFree(
     const boxes = corners
       .map(([left, top]) => ({ left, top, right: left + width, bottom: top + height }))
       .filter((box) => !within || contains(within, box));
-    for (const isFree of rules) {
-      const box = boxes.find(isFree);
-      if (box) return { text, width, box };
-    }
+    const box = rules.map((isFree) => boxes.find(isFree)).find((each) => each !== undefined);
+    if (box) return { text, width, box };
   }
   return null;
 }
-
-const grown = ({ left, top, right, bottom }: Box, by: number): Box => ({
-  left: left - by,
-  top: top - by,
-  right: right + by,
-  bottom: bottom + by,
-});
 
 const contains = (outer: Box, inner: Box): boolean =>
   inner.left >= outer.left &&
@@ -202,16 +190,10 @@ class Buckets {
     }
   }
 
-  isFree(box: Box, ignored: readonly Box[] = []): boolean {
-    for (const key of keys(box)) {
+  isFree(box: Box, ignored: readonly Box[] = [], gap = 0): boolean {
+    for (const key of keys(box, gap)) {
       for (const other of this.#boxes.get(key) ?? []) {
-        const apart =
-          ignored.includes(other) ||
-          box.right <= other.left ||
-          other.right <= box.left ||
-          box.bottom <= other.top ||
-          other.bottom <= box.top;
-        if (!apart) return false;
+        if (!ignored.includes(other) && !areApart(box, other, gap)) return false;
       }
     }
     return true;
@@ -221,9 +203,10 @@ class Buckets {
 /** Squares on one side of the map's origin: half a row. */
 const HALF = 2 ** 25;
 
-function* keys(box: Box): Generator<number> {
-  for (let i = Math.floor(box.left / BUCKET); i <= Math.floor(box.right / BUCKET); i++) {
-    for (let j = Math.floor(box.top / BUCKET); j <= Math.floor(box.bottom / BUCKET); j++) {
+function* keys({ left, top, right, bottom }: Box, gap = 0): Generator<number> {
+  const bucket = (at: number): number => Math.floor(at / BUCKET);
+  for (let i = bucket(left - gap); i <= bucket(right + gap); i++) {
+    for (let j = bucket(top - gap); j <= bucket(bottom + gap); j++) {
       yield (i + HALF) * 2 * HALF + j + HALF;
     }
   }

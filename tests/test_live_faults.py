@@ -78,6 +78,8 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
         client.until_tag("a")
         field_of(live, **FIELD)
+        advice = "/api/estimate/advice?sensor_type=temperature"
+        wait_for(lambda: live.get(advice).status_code == 200, "the log of its twin")
 
         def reported_in_time() -> bool:
             twin.freeze()
@@ -94,7 +96,6 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         wait_for(lambda: live.get("/readyz").status_code == 503, "its silence")
         assert field_of(live, **FIELD).json()["sample_count"] == 1, "what is known of it still is"
         # A busy machine may take longer than a second.
-        advice = "/api/estimate/advice?sensor_type=temperature"
         wait_for(
             lambda: live.get(advice).status_code == 200,
             "advice, which is made of the log",

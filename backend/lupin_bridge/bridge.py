@@ -11,7 +11,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Hashable, Iterator, Mapping
-from typing import Any, Final
+from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
@@ -89,7 +89,7 @@ class Bridge:
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache
-        self.answering: Shared[Any] = Shared()
+        self.answering = Shared()
         self.criteria = criteria or Criteria.of(settings)
         self.frames = FrameWriter(self.criteria.sensors.by_name)
         self.offer = Offer(source)

@@ -92,7 +92,7 @@ def write(folder: Path) -> None:
 
 
 def readings(rows: Sequence[Write]) -> int:
-    return sum(len(row.values) for row in rows if isinstance(row, Observation))
+    return sum(len(row.readings) for row in rows if isinstance(row, Observation))
 
 
 def handed_to_disk() -> int:

@@ -125,6 +125,6 @@ def fill(path: Path, greenhouse: Greenhouse) -> Filled:
         received = greenhouse.rows()
         while lot := list(islice(received, _BATCH)):
             file.append([(run, row) for row in lot])
-            readings += sum(len(row.values) for row in lot if isinstance(row, Observation))
+            readings += sum(len(row.readings) for row in lot if isinstance(row, Observation))
             file.check_size(may_purge=False)
     return Filled(path, greenhouse, readings)

@@ -96,7 +96,7 @@ class Robot:
 
 
 def message_of(row: Observation) -> Any:
-    return scan(row.tag_id, row.values, status=row.status, stamp_s=row.stamp_ns / SECOND)
+    return scan(row.tag_id, row.readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
 
 
 def is_reported(row: Observation, tag: dict[str, Any]) -> bool:

@@ -119,7 +119,7 @@ def test_readings_have_the_units_of_the_contract(patrol: list[Event]) -> None:
         "soil_moisture": (20.0, 100.0),
     }
     for scan in scans_of(patrol):
-        for name, value in scan.values.items():
+        for name, value in scan.readings.items():
             low, high = plausible[name]
             assert low < value < high, name
 

@@ -54,7 +54,7 @@ def test_every_tag_is_scanned_in_every_round_and_some_scans_fail(scans: list[Obs
         failed = [row for row in attempted if row.status]
         assert {row.status for row in failed} == {1, 2}
         assert all(row.status_detail for row in failed)
-        assert not any(row.values for row in failed)
+        assert not any(row.readings for row in failed)
 
 
 def test_each_tag_gets_its_exact_position_before_anything_else(rows: list[Write]) -> None:
@@ -79,7 +79,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[Observation]) -> None
     def off_by(hours: float) -> float:
         return fmean(
             abs(
-                row.values["temperature"]
+                row.readings["temperature"]
                 - truth.of(
                     "temperature",
                     tags[row.tag_id].position,
@@ -87,7 +87,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[Observation]) -> None
                 )
             )
             for row in scans
-            if "temperature" in row.values
+            if "temperature" in row.readings
         )
 
     assert off_by(0) < min(off_by(hours) for hours in (-2, -1, 1, 2)) / 1.5

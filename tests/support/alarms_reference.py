@@ -82,7 +82,7 @@ def _mine(tag_id: str, of_run: list[Observation]) -> list[list[Observation]]:
 
 
 def _readings(occasion: list[Observation]) -> dict[str, float]:
-    return {name: value for write in occasion for name, value in write.values.items()}
+    return {name: value for write in occasion for name, value in write.readings.items()}
 
 
 def _light(of_run: list[Observation], at_ns: int) -> bool | None:
@@ -90,7 +90,7 @@ def _light(of_run: list[Observation], at_ns: int) -> bool | None:
     scanned: dict[str, int] = {}
     for write in of_run:
         if write.stamp_ns <= at_ns:
-            for name, value in write.values.items():
+            for name, value in write.readings.items():
                 scanned[write.tag_id] = write.stamp_ns
                 if name == "light":
                     latest[write.tag_id] = write.stamp_ns, value

@@ -78,9 +78,9 @@ class Life:
         key = (self.run, row.tag_id, row.kind, row.stamp_ns, row.source)
         known = self._known.get(key)
         sensors = self._known.setdefault(key, set())
-        row = replace(row, values={it: v for it, v in row.values.items() if it not in sensors})
-        sensors.update(row.values)
-        return row if known is None or row.values else None
+        row = replace(row, readings={it: v for it, v in row.readings.items() if it not in sensors})
+        sensors.update(row.readings)
+        return row if known is None or row.readings else None
 
     def begin(self, at_ns: int, ended_ns: int | None = None) -> None:
         """A clock that is new, or has gone back; the latest of what was known is copied."""
@@ -127,9 +127,9 @@ class Life:
 
     def readings(self, tag_id: str, sensor: str) -> list[Entry]:
         return sorted(
-            (row.stamp_ns, number, row.values[sensor])
+            (row.stamp_ns, number, row.readings[sensor])
             for number, row in self._of(tag_id)
-            if isinstance(row, Observation) and sensor in row.values
+            if isinstance(row, Observation) and sensor in row.readings
         )
 
     def events(self, tag_id: str, event: Event) -> list[Entry]:
@@ -145,7 +145,7 @@ class Life:
             elif row.status != STATUS_OK and event is Event.FAILURES:
                 value = row.status
             elif not row.kind and row.status == STATUS_OK and event is Event.SCANS:
-                value = len(row.values)
+                value = len(row.readings)
             if value is not None:
                 found.append((row.stamp_ns, number, float(value)))
         return sorted(found)
@@ -211,7 +211,7 @@ class Life:
             if number in held:
                 found += [
                     PastRow(stamp_ns, row.tag_id, x, y, name, value, row.status, row.source)
-                    for name, value in row.values.items() or [("", math.nan)]
+                    for name, value in row.readings.items() or [("", math.nan)]
                 ]
         return found
 

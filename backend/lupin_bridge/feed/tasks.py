@@ -78,14 +78,14 @@ class Periodic:
             await asyncio.sleep(self._every_s)
 
 
-class Shared(Generic[ResultT]):
+class Shared:
     """Runs identical work once for all callers, and cancels it when nobody waits any more.
 
-    A key identifies the work. Belongs to the event loop.
+    A key identifies the work, and with it the type of its result. Belongs to the event loop.
     """
 
     def __init__(self) -> None:
-        self._flights: dict[Hashable, _Flight[ResultT]] = {}
+        self._flights: dict[Hashable, _Flight[Any]] = {}
 
     def __len__(self) -> int:
         return len(self._flights)
@@ -114,7 +114,7 @@ class Shared(Generic[ResultT]):
                 self._forget(key, flight)  # or a new caller would wait for cancelled work
                 flight.task.cancel()
 
-    def _forget(self, key: Hashable, flight: _Flight[ResultT]) -> None:
+    def _forget(self, key: Hashable, flight: _Flight[Any]) -> None:
         if self._flights.get(key) is flight:
             del self._flights[key]
         if flight.task.done() and not flight.task.cancelled():

@@ -137,7 +137,7 @@ class Fleet:
         self.pages = SitePages(make, lambda: self.watching.sites, limits.open_sites)
         # `routes.answers` needs these, as it does of a bridge.
         self.cache = AnswerCache()
-        self.answering: Shared[Answer] = Shared()
+        self.answering = Shared()
         self._frame = SitesFrame(self.watching.sites, self.watching.archive, 0)
         self._framed_s = -math.inf
         self._pushing = Periodic(self._push, _FRAME_S, "the overview", 0.0)

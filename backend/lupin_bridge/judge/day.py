@@ -274,7 +274,7 @@ def days_of(
     """By tag, the daily quantities of its last day; `scans`: the last `SINCE_NS`, oldest first."""
     every: dict[str, dict[str, dict[int, float]]] = {}
     for scan in scans:
-        for name, value in scan.values.items():
+        for name, value in scan.readings.items():
             # For one moment, the value received last counts.
             every.setdefault(scan.tag_id, {}).setdefault(name, {})[scan.stamp_ns] = value
     is_day, number = _by_the_minute(is_day), _by_the_minute(number)

@@ -346,5 +346,5 @@ class TagEpisodes:
 def readings_of(writes: Sequence[Observation]) -> tuple[Reading, ...]:
     """The readings of an occasion: for each sensor, the one received last."""
     stamp_ns = writes[0].stamp_ns
-    latest = {name: value for write in writes for name, value in write.values.items()}
+    latest = {name: value for write in writes for name, value in write.readings.items()}
     return tuple(Reading(name, value, stamp_ns) for name, value in latest.items())

@@ -268,8 +268,8 @@ class RecentScans:
             if name in tags and write.flower is not None:
                 is_news = self.tag(name).see(write.stamp_ns, write.flower.sure_species)
                 others |= {name} if is_news else set()
-            elif name in tags and write.values:
-                scans.setdefault((write.stamp_ns, name), {}).update(write.values)
+            elif name in tags and write.readings:
+                scans.setdefault((write.stamp_ns, name), {}).update(write.readings)
         late_ns: int | None = None
         for at_ns, group in groupby(sorted(scans), key=itemgetter(0)):
             names = [it for _, it in group if self.tag(it).put(tags[it], at_ns, scans[at_ns, it])]
@@ -352,7 +352,7 @@ def light_turns(scans: Iterable[Observation]) -> Iterator[Observation]:
     said: dict[str, tuple[bool | None, int]] = {}
     for scan in scans:
         before, light_ns = said.get(scan.tag_id, (None, 0))
-        light = scan.values.get(LIGHT)
+        light = scan.readings.get(LIGHT)
         said[scan.tag_id] = light_after(before, light_ns, scan.stamp_ns, light)
         if said[scan.tag_id][0] is not before:
             yield scan

@@ -432,7 +432,7 @@ async def respond_past(request: Request, query: Query, kind: str) -> Response:
     async def work() -> Answer | Response:
         # The log grows: an equal query later is another one.
         key = (kind, query, header, bridge.state_number)
-        found: Answered = await bridge.answering.get(key, ask)
+        found = await bridge.answering.get(key, ask)
         return found.answer or not_modified(found.etag)
 
     return await admitted(request, work)

@@ -31,7 +31,7 @@ from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response
 from lupin_bridge.routes.field import newest_field
-from lupin_bridge.serving.admission import AdmissionError, Answer
+from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.connections import CONNECTION_KEY
 from lupin_bridge.serving.ws_protocol import BINARY, Connection, frame_head
 from lupin_bridge.stream.frames import text_frame
@@ -383,7 +383,5 @@ class _RosbridgeConversation(_Conversation):
             return answer.body
         client = self._client.address
         held.enter_context(bridge.admission.request(client, time.monotonic()))
-        found: Answer = await bridge.answering.get(
-            etag, lambda: newest_field(bridge, client, field, etag)
-        )
+        found = await bridge.answering.get(etag, lambda: newest_field(bridge, client, field, etag))
         return found.body

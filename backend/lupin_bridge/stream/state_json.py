@@ -182,8 +182,8 @@ def history(tag_id: str, writes: Iterable[Observation], count: int) -> dict[str,
         key: object = number if write.own_stamp_ns == KNOWN_BY_NOTHING else key_of(write)
         stamp_ns = attempts[key][0].stamp_ns if key in attempts else write.stamp_ns
         attempts[key] = Attempt(stamp_ns, write.status, write.status_detail), write.kind
-        if write.values:
-            scans.setdefault(key, (stamp_ns, {}))[1].update(write.values)
+        if write.readings:
+            scans.setdefault(key, (stamp_ns, {}))[1].update(write.readings)
         if write.source:
             sources.append((stamp_ns, number, write.source))
     sensors: dict[str, list[dict[str, Any]]] = {}

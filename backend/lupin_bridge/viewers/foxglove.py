@@ -237,7 +237,7 @@ class Offer:
         self._source = source
         self._ids = count(1)
         self._looked_s = -math.inf
-        self._looking: Shared[None] = Shared()
+        self._looking = Shared()
         self._guard = Guard("foxglove's layers are unchanged")
 
     async def look(self) -> None:

@@ -167,7 +167,7 @@ class Writer:
     def __init__(self, relay: Relay, workers: Workers) -> None:
         self._relay = relay
         self._workers = workers
-        self._writing: Shared[bytes] = Shared()
+        self._writing = Shared()
         # By topic.
         self._guards: dict[str, Guard] = {}
 

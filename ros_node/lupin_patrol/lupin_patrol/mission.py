@@ -28,8 +28,8 @@ from lupin_patrol.perception import (
     Exploration,
     Grid,
     Plants,
+    readings_at,
     stream,
-    values_at,
 )
 from lupin_twin.core.state import KIND_FLOWER, Observation, Pin, Pose, Write
 
@@ -219,12 +219,12 @@ class Mission:
         self._now_s += _READ_S
         time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
         pose: Pose | None = None
-        values: dict[str, float] = {}
+        readings: dict[str, float] = {}
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
             pose = pose_of(tag.position, tag.yaw)
-            values = values_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
-        scan = Observation(tag.tag_id, 0, values, pose, status, _DETAILS[status])
+            readings = readings_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
+        scan = Observation(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
         yield Visited(self._now_s, pass_index, time_of_day_s, scan)
         if pose is not None:
             self._now_s += _PICTURE_S

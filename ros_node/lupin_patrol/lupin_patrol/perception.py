@@ -130,7 +130,7 @@ SECONDS_PER_DAY = 86_400.0
 _TO_CONTRACT_UNIT = {"soil_moisture": 100.0}
 
 
-def values_at(
+def readings_at(
     registry: Any, sensors: Sequence[str], position: Point, time_of_day_s: float, chance: Random
 ) -> dict[str, float]:
     """Read sensors at a place (m, map) and time (s since midnight), noise from `chance` included.

@@ -430,8 +430,8 @@ def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> Non
         (9, "b", 6, 0, 2),
     ]
     assert reported[0].flower == pest
-    assert reported[1].values == {"co2": 400.0, "light": 1.0}
+    assert reported[1].readings == {"co2": 400.0, "light": 1.0}
     second = after(store, Observation("a", 9, {"co2": 410.0}))
     (new,) = writes_between(first, second, 10)
-    assert (new.stamp_ns, new.values) == (9, {"co2": 410.0})
+    assert (new.stamp_ns, new.readings) == (9, {"co2": 410.0})
     assert writes_between(second, replace(second, stamp_ns=NOW + 1), 11) == []

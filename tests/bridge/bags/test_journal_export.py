@@ -39,7 +39,7 @@ ROWS: list[Write] = [
     replace(FAILED_INSPECTION, arrival_ns=NOW + 2000),
     # Late, and from a robot whose clock is ahead: such a clock does not count.
     replace(scan("8", NOW + SECOND), own_stamp_ns=NOW * 3),
-    replace(scan("8", NOW + 3 * SECOND), values={}, status=1, status_detail="no way"),
+    replace(scan("8", NOW + 3 * SECOND), readings={}, status=1, status_detail="no way"),
     inspection("7", NOW + 4 * SECOND),
     replace(pin("9", NOW + 5 * SECOND), pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 1e-9)),
     *(scan("7", NOW + 6 * SECOND + n, temperature=float(n)) for n in range(9)),

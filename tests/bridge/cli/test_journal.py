@@ -33,7 +33,7 @@ SIMULATED = Clock(5 * SECOND, NOW, is_simulated=True)
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     made = tmp_path / "j.sqlite"
-    failed = replace(scan("8"), values={}, status=2, status_detail="no answer")
+    failed = replace(scan("8"), readings={}, status=2, status_detail="no answer")
     scans = [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(2000)]
     append(made, [pin(), failed, inspection(), *scans])
     return made

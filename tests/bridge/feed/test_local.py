@@ -125,7 +125,7 @@ async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain
 
 
 async def test_a_request_that_arrives_as_the_last_one_is_cancelled_starts_new_work() -> None:
-    shared, begun, may_end = Shared[int](), list[None](), asyncio.Event()
+    shared, begun, may_end = Shared(), list[None](), asyncio.Event()
 
     async def work() -> int:
         begun.append(None)
@@ -145,7 +145,7 @@ async def test_a_request_that_arrives_as_the_last_one_is_cancelled_starts_new_wo
 
 
 async def test_an_error_reaches_all_waiters_and_is_not_cached() -> None:
-    shared, begun = Shared[int](), list[None]()
+    shared, begun = Shared(), list[None]()
 
     async def work() -> int:
         begun.append(None)

@@ -69,7 +69,7 @@ def some_write(chance: random.Random, number: int) -> Observation:
     )
     if one.kind == SCAN:
         names = chance.sample(sorted(VALUES), chance.randint(0, 4))
-        return replace(one, values={name: chance.choice(VALUES[name]) for name in names})
+        return replace(one, readings={name: chance.choice(VALUES[name]) for name in names})
     if one.status:
         return one
     species, bugs = chance.choice(["", "Orchid", "tulip"]), chance.randint(0, 3)

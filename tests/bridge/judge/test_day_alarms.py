@@ -82,7 +82,7 @@ def test_a_days_mean_raises_at_the_next_dawn_and_has_no_deadband() -> None:
     reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
     assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
     own = [
-        replace(one, values={"temperature": 14.0, MEAN: 20.0})
+        replace(one, readings={"temperature": 14.0, MEAN: 20.0})
         for one in scans({"temperature": [14.0] * 3})
     ]
     assert found(own) == []
@@ -91,10 +91,10 @@ def test_a_days_mean_raises_at_the_next_dawn_and_has_no_deadband() -> None:
 def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
     chance = random.Random(4)
     received = [
-        replace(one, values={"temperature": chance.uniform(5.0, 14.0)})
+        replace(one, readings={"temperature": chance.uniform(5.0, 14.0)})
         for one in scans({"temperature": [0.0] * 3}, every_h=0.2)
     ]
-    readings = [(one.stamp_ns, one.values["temperature"]) for one in received]
+    readings = [(one.stamp_ns, one.readings["temperature"]) for one in received]
     alarms = found(received)
     assert {one.reason.sensor for one in alarms} == {MEAN, MINIMUM}
     for alarm in alarms:
@@ -149,7 +149,9 @@ def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives
     # Some days lack their last hours and much of the next day.
     gaps = [(dawn(day) + 20 * HOUR, dawn(day) + 44 * HOUR) for day in range(seed % 3, 7, 3)]
     received = [
-        replace(one, values={"temperature": chance.choice([*3 * [5.0, 14.0, 20.0], math.nan, 1e9])})
+        replace(
+            one, readings={"temperature": chance.choice([*3 * [5.0, 14.0, 20.0], math.nan, 1e9])}
+        )
         for one in scans({"temperature": [0.0] * 7}, every_h=chance.choice([0.5, 1.0]))
         if not any(start < one.stamp_ns < end for start, end in gaps)
     ]

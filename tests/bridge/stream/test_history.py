@@ -31,8 +31,8 @@ def test_the_history_equals_the_simplest_one(writes: list[Observation], count: i
     keys: dict[tuple[int, int, str], None] = {}
     for write in writes:
         keys.setdefault((write.stamp_ns, write.kind, write.source))
-        if write.values:
-            scans.setdefault((write.stamp_ns, write.source), {}).update(write.values)
+        if write.readings:
+            scans.setdefault((write.stamp_ns, write.source), {}).update(write.readings)
     past = history("1", writes, count)
     latest = sorted(keys, key=lambda key: key[0])[-count:]
     assert [(it["stamp"], it["kind"]) for it in past["tries"]] == [

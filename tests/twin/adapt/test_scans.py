@@ -56,7 +56,7 @@ def test_a_long_stop_is_one_scan_per_window() -> None:
     assert [scan.stamp_ns for scan in scans.due(10 * S)] == [S]
     read(scans, 11, 30.0)
     (scan,) = move(scans, 12, 9.0)
-    assert scan.values == {"temperature": 30.0}
+    assert scan.readings == {"temperature": 30.0}
 
 
 def test_a_stop_without_readings_is_a_failed_scan_and_passing_by_is_none() -> None:
@@ -65,7 +65,7 @@ def test_a_stop_without_readings_is_a_failed_scan_and_passing_by_is_none() -> No
     assert move(scans, 1, 1.5) == []
     move(scans, 2, 0.0)
     (scan,) = move(scans, 5, 1.5)
-    assert (scan.tag_id, scan.values, scan.status) == ("A", {}, SCAN_FAILED)
+    assert (scan.tag_id, scan.readings, scan.status) == ("A", {}, SCAN_FAILED)
     assert scan.status_detail == "no reading in 3 s here"
 
 
@@ -114,7 +114,7 @@ def test_a_fixed_sensor_needs_no_robot() -> None:
     (scan,) = scans.due(10 * S)
     assert (scan.tag_id, scan.pose, scan.stamp_ns) == ("B", TAGS["B"], 9 * S)
     assert scan.source == FIXED_SOURCE
-    assert scan.values == {"co2": 404.5}
+    assert scan.readings == {"co2": 404.5}
     assert list(scans.due(30 * S)) == []
 
 
@@ -158,7 +158,7 @@ def test_mean_and_spread_match_their_definitions(values: list[float]) -> None:
     for value in values:
         read(scans, 1, value)
     (scan,) = move(scans, 2, 9.0)
-    assert scan.values["temperature"] == pytest.approx(statistics.fmean(values), abs=1e-6)
+    assert scan.readings["temperature"] == pytest.approx(statistics.fmean(values), abs=1e-6)
     spread = float(scan.status_detail.split("±")[1].split()[0])
     assert spread == pytest.approx(statistics.stdev(values), rel=0.06, abs=1e-6)
 

@@ -191,13 +191,13 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
     tags: dict[str, TagState] = {}
     for tag_id in dict.fromkeys(write.tag_id for write in writes):
         own = [write for write in writes if write.tag_id == tag_id]
-        names = dict.fromkeys(name for w in own for name in w.values)
+        names = dict.fromkeys(name for w in own for name in w.readings)
         attempted = sorted(own, key=lambda write: write.stamp_ns)
         seen = [write for write in attempted if brings(write)]
         values = {
             name: Reading(name, value, write.stamp_ns)
             for write in attempted
-            for name, value in write.values.items()
+            for name, value in write.readings.items()
         }
         looks = [w for w in attempted if w.flower is not None]
         last_observed = seen[-1] if seen else attempted[0]
@@ -214,7 +214,7 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
 
 
 def brings(write: Write) -> bool:
-    return write.status == STATUS_OK or bool(write.values)
+    return write.status == STATUS_OK or bool(write.readings)
 
 
 Write = Observation
@@ -240,9 +240,9 @@ STEPS = st.lists(SCANS | INSPECTIONS | st.integers(1, 30), max_size=25)
 
 def numbered(write: Write, number: int) -> Write:
     """The write with a value of its own, so that it differs from all others."""
-    values = dict.fromkeys(write.values, float(number))
+    values = dict.fromkeys(write.readings, float(number))
     flower = None if write.flower is None else Flower(flower_count=number)
-    return replace(write, values=values, flower=flower, status_detail=str(number))
+    return replace(write, readings=values, flower=flower, status_detail=str(number))
 
 
 @given(STEPS)

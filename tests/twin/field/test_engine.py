@@ -62,7 +62,7 @@ def scan(tag_id: str, x: float, y: float, value: float) -> Observation:
     return Observation(
         tag_id=tag_id,
         stamp_ns=1,
-        values={"temperature": value},
+        readings={"temperature": value},
         pose=Pose(x, y, 0.5, 0.0, 0.0, 0.0, 1.0),
     )
 

@@ -153,7 +153,7 @@ def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> No
         tuple(
             write
             for write in run
-            if start_ns <= write.stamp_ns <= end_ns and not sensors.isdisjoint(write.values)
+            if start_ns <= write.stamp_ns <= end_ns and not sensors.isdisjoint(write.readings)
         ),
         tuple(
             write

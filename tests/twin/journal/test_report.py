@@ -163,7 +163,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
 def check_sensors(found: list[dict[str, Any]], scans: list[Observation]) -> None:
     values: dict[str, list[tuple[float, str, int]]] = {}
     for it in scans:
-        readings = [Reading(name, value, it.stamp_ns) for name, value in it.values.items()]
+        readings = [Reading(name, value, it.stamp_ns) for name, value in it.readings.items()]
         for reading in (*readings, *derive(readings)):
             mine = values.setdefault(reading.name, [])
             mine.append((reading.value, it.tag_id, it.stamp_ns))

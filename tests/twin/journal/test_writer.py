@@ -262,7 +262,7 @@ def test_age_and_size_limits_are_applied(path: Path, monkeypatch: pytest.MonkeyP
 
 def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
     too_late = scan(at_ns=2**63)
-    no_number = replace(scan("8"), values={"t": "x"})  # type: ignore[dict-item]
+    no_number = replace(scan("8"), readings={"t": "x"})  # type: ignore[dict-item]
     assert append(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
     assert known(path) == {scan("1"), scan("2")}
 
@@ -272,7 +272,7 @@ def test_a_reading_with_all_digits_takes_at_most_60_bytes(path: Path) -> None:
     rows = [
         replace(
             scan(str(number % 20), NOW + number * 30 * SECOND),
-            values={name: chance.random() for name in "abcde"},
+            readings={name: chance.random() for name in "abcde"},
         )
         for number in range(3_000)
     ]

@@ -32,7 +32,7 @@ def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copie
         assert (seen.flower.species, seen.flower.anomaly, seen.flower.bug_count) == (
             ("lupin", True, 1)
         )
-        assert whole.writes[3].values == {"co2": 400.0, "light": 1.0}
+        assert whole.writes[3].readings == {"co2": 400.0, "light": 1.0}
         assert [(span.start_ns, span.end_ns) for span in whole.spans] == [(0, 2**63 - 1)]
         assert requested(copied(life.connection)) == whole
 

@@ -171,14 +171,14 @@ class Scans:
     def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> Observation:
         means = sorted(window.means.items())
         detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
-        values = {name: mean.mean for name, mean in means}
-        return self._built(tag_id, window.newest_ns, values, detail, is_fixed=is_fixed)
+        readings = {name: mean.mean for name, mean in means}
+        return self._built(tag_id, window.newest_ns, readings, detail, is_fixed=is_fixed)
 
     def _built(
         self,
         tag_id: str,
         stamp_ns: int,
-        values: Mapping[str, float],
+        readings: Mapping[str, float],
         detail: str,
         *,
         is_fixed: bool,
@@ -186,9 +186,9 @@ class Scans:
         return Observation(
             tag_id,
             stamp_ns,
-            values,
+            readings,
             self.places.get(tag_id, self._cell if tag_id == self.tag else None),
-            STATUS_OK if values else SCAN_FAILED,
+            STATUS_OK if readings else SCAN_FAILED,
             detail[:MAX_TEXT_LENGTH],
             FIXED_SOURCE if is_fixed else VISIT_SOURCE,
         )

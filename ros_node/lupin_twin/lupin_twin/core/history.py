@@ -48,9 +48,9 @@ class Repeats:
         if known is None:
             return write
         known_ns, names = known
-        values = {name: value for name, value in write.values.items() if name not in names}
+        values = {name: value for name, value in write.readings.items() if name not in names}
         stamp_ns = min(write.stamp_ns, known_ns)
-        return replace(write, stamp_ns=stamp_ns, values=values) if values else None
+        return replace(write, stamp_ns=stamp_ns, readings=values) if values else None
 
     def add(self, write: Observation) -> None:
         """Remember an observation, or more of its sensors; a tag's oldest ones make room."""
@@ -58,7 +58,7 @@ class Repeats:
             return
         tag, key = self._tags.setdefault(write.tag_id, {}), key_of(write)
         known_ns, known = tag.pop(key, (write.stamp_ns, frozenset()))
-        tag[key] = known_ns, known.union(write.values)
+        tag[key] = known_ns, known.union(write.readings)
         while len(tag) > max(1, min(KNOWN_PER_TAG, MAX_KNOWN // len(self._tags))):
             del tag[next(iter(tag))]
 

@@ -288,7 +288,7 @@ def recent_of(writes: Iterable[Observation], at_ns: int) -> tuple[Observation, .
     """Select the writes that are recent at a moment, from those of one run in any order."""
     by_tag: dict[tuple[str, int], list[Observation]] = {}
     for write in writes:
-        if write.stamp_ns <= at_ns and (write.values or write.flower):
+        if write.stamp_ns <= at_ns and (write.readings or write.flower):
             by_tag.setdefault((write.tag_id, write.kind), []).append(write)
     found: list[Observation] = []
     for mine in by_tag.values():

@@ -124,7 +124,7 @@ NO_FLOWER = Flower()
 class Observation:
     """One attempt at a tag: a scan of its sensors, or an inspection of its flowers; see `kind`.
 
-    `values` has the readings by sensor, `flower` is what an inspection saw. A failed attempt (see
+    `readings` are by sensor, `flower` is what an inspection saw. A failed attempt (see
     `status`) has no pose. `stamp_ns` is never later than now. `own_stamp_ns` is the producer's
     stamp, 0 if there is none; a message that is received again is recognised by it. `arrival_ns` is
     wall time. In a journal, it has a `number`, and belongs to a `run` of the clock; it is the same
@@ -133,7 +133,7 @@ class Observation:
 
     tag_id: str
     stamp_ns: int
-    values: Mapping[str, float] = field(default_factory=dict, hash=False)
+    readings: Mapping[str, float] = field(default_factory=dict, hash=False)
     pose: Pose | None = None
     status: int = STATUS_OK
     status_detail: str = ""
@@ -272,7 +272,7 @@ class TwinStore:
 
         """
         check_texts("tag_id", new.tag_id)
-        check_texts("a reading's name", *new.values)
+        check_texts("a reading's name", *new.readings)
         flower, at_ns = new.flower, new.stamp_ns
         if flower is not None:
             check_texts("species", flower.species, *(b.species for b in flower.blooms))
@@ -283,14 +283,14 @@ class TwinStore:
             seen = tag.flower if repr(flower) == repr(tag.flower) else flower  # NaN is not NaN
             tag = replace(tag, flower=seen, looked_at_ns=at_ns)
         readings = {reading.name: reading for reading in tag.readings}
-        for name, number in new.values.items():
+        for name, number in new.readings.items():
             reading = Reading(name, number, at_ns)
             known = readings.setdefault(name, reading)
             if not _is_later(known.observed_at_ns, at_ns) and not _is_same(known, reading):
                 readings[name] = reading
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
         observed_ns = self._observed.get(tag.tag_id)
-        if new.status == STATUS_OK or new.values or flower is not None:
+        if new.status == STATUS_OK or new.readings or flower is not None:
             observed_ns = max(observed_ns or 0, at_ns)
         last_observed_ns = observed_ns
         if last_observed_ns is None:

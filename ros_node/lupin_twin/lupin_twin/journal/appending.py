@@ -133,7 +133,7 @@ class Appender:
     def _put_scan(self, run: int, tag: str, scan: Observation, is_copy: int) -> bool:
         """A scan, or an attempt of either kind that failed."""
         kind = scan.kind
-        readings = {valid_text(name): value for name, value in scan.values.items()}
+        readings = {valid_text(name): value for name, value in scan.readings.items()}
         stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), valid_text(scan.source)
         known = self._known((run, tag, kind), own_ns or stamp_ns, source, is_copy)
         if known is not None:

@@ -31,7 +31,7 @@ def weight(write: Write) -> int:
     if isinstance(write, Pin):
         return 1
     flower = write.flower or NO_FLOWER
-    return 1 + len(write.values) + len(flower.blooms) + len(flower.footprint)
+    return 1 + len(write.readings) + len(flower.blooms) + len(flower.footprint)
 
 
 # More than all publishers of a robot latch.

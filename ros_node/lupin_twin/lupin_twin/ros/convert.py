@@ -306,7 +306,7 @@ def observation_message(write: Observation, frame_id: str) -> Any:
         message.tag_reading = TagReading(
             tag_id=write.tag_id,
             stamp=header.stamp,
-            readings=_readings_message(write.values.items()),
+            readings=_readings_message(write.readings.items()),
         )
     else:
         flower = write.flower or NO_FLOWER

@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from ipaddress import IPv4Address, IPv6Address, ip_address, ip_network
+from ipaddress import IPv4Address, ip_address, ip_network
 from socket import SOCK_STREAM
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
@@ -303,10 +303,7 @@ def is_public(host: str) -> bool:
 
     """
     found = ip_address(host.partition("%")[0])
-    if isinstance(found, IPv6Address):
-        inner = IPv4Address(found.packed[-4:]) if found in _NAT64 else found.sixtofour
-        found = inner or found
-    return found.is_global
+    return (IPv4Address(found.packed[-4:]) if found in _NAT64 else found).is_global
 
 
 def check_device(device: Device, target: PushTarget) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -216,7 +217,8 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         robot = running.peer
         robot.observe(*[warm("a", value, at=(1, 1)) for value in (41.0, 43.5)])
         [alarm] = active(running, 1)
-        # Not in the millisecond of the alarm, which is the resolution of a link.
+        raised_s = alarm["raised_at"]["sec"] + alarm["raised_at"]["nanosec"] / 1e9
+        wait_for(lambda: time.time() > raised_s + 1, "a second after the alarm")
         robot.observe(warm("a", 42.0))
         running.tag("a", lambda tag: 42.0 in [each["value"] for each in tag["readings"]])
         hmi = open_page(running.url)
@@ -226,7 +228,6 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         hmi.page.keyboard.press("Enter")
         hmi.tab_to(row.get_by_role("button", name="Go to start"))
         hmi.page.keyboard.press("Enter")
-        raised_s = alarm["raised_at"]["sec"] + alarm["raised_at"]["nanosec"] / 1e9
         shown = re.compile(rf"^{int(raised_s)}\.\d+$|^{int(raised_s)}$")
         expect(hmi.app).to_have_attribute("data-moment", shown)
         expect(hmi.card("a")).to_contain_text("43.5")
@@ -241,6 +242,7 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         # A new one while somebody looks back: nothing gives way to it.
         hmi.turn(f"list=alarms&at={int(raised_s) + 1}")
         expect(rows(hmi, "active")).to_have_count(1)
+        expect(hmi.page.locator(".health")).to_contain_text("43.5")  # as it was then
         before = places(hmi, ".map-frame", ".alarms")
         robot.observe(*[warm("b", 43.5, at=(2, 1))] * 2)
         news = hmi.test_id("meanwhile").locator("visible=true")

@@ -34,6 +34,7 @@ PROGRAMS: Final = (
     "lupin_twin.cli",
     "lupin_patrol",
     "tests.support.limited",
+    "tests.support.upgrade_child",
 )
 # What they import while they run.
 IMPORTED: Final = (

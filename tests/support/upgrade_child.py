@@ -14,8 +14,8 @@ from lupin_twin.journal import rebuild
 _OPERATIONS = {"open", "os.link", "os.remove", "os.rename", "os.chmod", "sqlite3.connect"}
 
 
-def main(path: Path, kill_at: int) -> None:
-    seen = 0
+def command() -> None:
+    path, kill_at, seen = Path(sys.argv[1]), int(sys.argv[2]), 0
 
     def step() -> None:
         nonlocal seen
@@ -34,4 +34,4 @@ def main(path: Path, kill_at: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]))
+    command()

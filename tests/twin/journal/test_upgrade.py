@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import shutil
 import signal
 import sqlite3
@@ -24,6 +25,7 @@ from lupin_twin.journal.schema import TABLES, get_meta, open_reader
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import LIMITS, wait_state
 from tests.support.journal_answers import NAMES, answer, answers, old, same
+from tests.support.processes import run
 from tests.support.waiting import wait_for
 from tests.twin.journal.conftest import fail_on_a_full_disk
 
@@ -154,7 +156,7 @@ def test_version_4_keeps_its_identity_and_every_row(tmp_path: Path) -> None:
 
 def child(path: Path, number: int) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tests.support.upgrade_child", str(path), str(number)]
-    return subprocess.run(command, check=False, capture_output=True, text=True)
+    return run(command, os.environ)
 
 
 @pytest.mark.parametrize(("name", "kept"), [("late", "j.sqlite.v3"), (VERSION4, "j.sqlite.v4")])

@@ -1,7 +1,8 @@
 """The path from a request to its response: not modified, cached, under way, or computed.
 
 A request is admitted first. Its answer is computed once for all clients that wait for the same one,
-within a time limit, and only while somebody waits. The cache serves later requests at no cost.
+within a time limit, and only while somebody waits. The cache serves later requests at no cost. Past
+a limit, each function here raises an `AdmissionError`; other errors are those of the work.
 """
 
 from __future__ import annotations
@@ -247,13 +248,7 @@ async def respond(
     compute: Callable[[], Coroutine[Any, Any, Answer]],
     etag: str | None = None,
 ) -> Response:
-    """The answer under a key. `etag` is its key in the cache, if it is known beforehand.
-
-    Raises:
-        AdmissionError: past a limit of the client.
-        Exception: whatever `compute` raised.
-
-    """
+    """The answer under a key. `etag` is its key in the cache, if it is known beforehand."""
     bridge = bridge_of(request)
     if etag is not None and has_etag(request, etag):
         return not_modified(etag)
@@ -272,13 +267,7 @@ async def respond(
 
 
 async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Response]]) -> Response:
-    """The result of `work`. It counts as one request until the client has received it.
-
-    Raises:
-        AdmissionError: past a limit of the client.
-        Exception: whatever `work` raised.
-
-    """
+    """The result of `work`. It counts as one request until the client has received it."""
     bridge = bridge_of(request)
     with ExitStack() as held:
         held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
@@ -356,13 +345,7 @@ async def computed(
     *,
     timed: AbstractContextManager[object] = _NOT_TIMED,
 ) -> Answer:
-    """The answer that `write` makes on a worker, put into the cache; `timed` lasts as long.
-
-    Raises:
-        BusyError: one computation too many.
-        Exception: whatever `write` raised.
-
-    """
+    """The answer that `write` makes on a worker, put into the cache; `timed` lasts as long."""
     with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times, timed:
         answer = await on_worker(bridge, write, cost_s * times)
     bridge.cache.put(key, answer)
@@ -373,13 +356,7 @@ async def computed(
 
 
 async def respond_as_of(request: Request, query: StateQuery) -> Response:
-    """A query as of a moment; headers say how far the answer is complete.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: what the source or the query raised.
-
-    """
+    """A query as of a moment; headers say how far the answer is complete."""
     journal, at_ns = bridge_of(request).source.journal(), query.at_ns or 0
     # As of before the answer. In headers, as the body stays the same when older rows are deleted.
     headers = bodies.moment_headers(journal, at_ns)
@@ -392,13 +369,7 @@ async def respond_as_of(request: Request, query: StateQuery) -> Response:
 
 
 async def respond_past(request: Request, query: Query, kind: str) -> Response:
-    """A query of the past; `kind` is its name in the metrics.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: what the source or the query raised.
-
-    """
+    """A query of the past; `kind` is its name in the metrics."""
     bridge = bridge_of(request)
     header = list_header(request, "if-none-match")
 

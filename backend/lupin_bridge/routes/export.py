@@ -131,13 +131,7 @@ async def respond_export(
     known: Mapping[str, str],
     has_site: bool = False,
 ) -> Response:
-    """Stream what `rows` yields, in a format; `known` are headers on how far it is complete.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: whatever reading the first rows raised.
-
-    """
+    """Stream what `rows` yields, in a format; `known` are headers on how far it is complete."""
     name = bodies.export_file_name(given, now_ns, kind.name)
     headers = {
         **NEVER_STORE, **known, "Content-Disposition": f'attachment; filename="{name}"',

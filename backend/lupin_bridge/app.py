@@ -113,20 +113,24 @@ FRAMES = (
     schema.AlarmsFrame,
     routes_schema.RobotFrame,
     schema.Alarms,
-    routes_schema.NoteDraft,
-    routes_schema.ObservationDraft,
-    routes_schema.PushSubscription,
 )
 
 
 def _describe_frames(app: FastAPI) -> None:
-    """Add the WebSocket frames, which OpenAPI has no place for, to the document's schemas."""
+    """Add the WebSocket frames, which OpenAPI has no place for, to the document's schemas.
+
+    Take out FastAPI's own refusal: `add_refusals` makes it a 400.
+    """
     plain = app.openapi
 
     @cache
     def with_frames() -> dict[str, object]:
         document = plain()
         schemas = document.setdefault("components", {}).setdefault("schemas", {})
+        for name in ("HTTPValidationError", "ValidationError"):
+            schemas.pop(name, None)
+        for operation in (it for path in document["paths"].values() for it in path.values()):
+            operation["responses"].pop("422", None)
         for model in FRAMES:
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             schemas.update(described.pop("$defs", {}))

@@ -122,9 +122,8 @@ def make_file(path: Path) -> None:
 class Accounts:
     """The open accounts file, in one thread; only with `is_writer` can it be changed.
 
-    Raises:
-        AccountError: it does not exist, cannot be read, or is something else.
-
+    It and every method raise `AccountError` if there is no such file, or it cannot be read or
+    written.
     """
 
     def __init__(self, path: Path, *, is_writer: bool = False) -> None:
@@ -257,10 +256,6 @@ class Accounts:
         """Begin a session of an account or token; returns its cookie.
 
         None: it was removed meanwhile, or has another secret.
-
-        Raises:
-            AccountError: the file cannot be written.
-
         """
         cookie, name = secrets.token_urlsafe(32), person.name
         with self._writing() as connection:
@@ -281,12 +276,7 @@ class Accounts:
         return cookie
 
     def end_session(self, person: Person, address: str, now_s: int) -> None:
-        """End a session.
-
-        Raises:
-            AccountError: it cannot be written.
-
-        """
+        """End a session."""
         with self._writing() as connection:
             connection.execute("DELETE FROM session WHERE id = ?", (person.session,))
             _audit(connection, Audited(now_s, person.name, "sign out", "", address))
@@ -315,12 +305,7 @@ class Accounts:
                 _audit(connection, Audited(now_s, name, "add device", "", address))
 
     def remove_device(self, endpoint: str, name: str = "") -> None:
-        """Remove a browser; with `name`, only if it is theirs.
-
-        Raises:
-            AccountError: it cannot be written.
-
-        """
+        """Remove a browser; with `name`, only if it is theirs."""
         with self._writing() as connection:
             connection.execute(
                 "DELETE FROM device WHERE endpoint = ? AND ? IN ('', name)", (endpoint, name)
@@ -335,12 +320,7 @@ class Accounts:
         return [Device(*row) for *row, sites in found if not sites or site in _lines(sites)]
 
     def kept(self, key: str, make: Callable[[], str]) -> str:
-        """A value that is stored in this file; the first caller makes it.
-
-        Raises:
-            AccountError: it cannot be written.
-
-        """
+        """A value that is stored in this file; the first caller makes it."""
         with self._writing() as connection:
             get = "SELECT value FROM meta WHERE key = ?"
             found = connection.execute(get, (key,)).fetchone()
@@ -353,12 +333,7 @@ class Accounts:
     # --- the audit trail ----------------------------------------------------------------------
 
     def note(self, done: Audited) -> None:
-        """Add an entry to the audit trail.
-
-        Raises:
-            AccountError: it cannot be written.
-
-        """
+        """Add an entry to the audit trail."""
         with self._writing() as connection:
             _audit(connection, done)
 

@@ -51,7 +51,9 @@ class People:
     """Finds out who makes a request.
 
     `path` is the accounts file: until it exists, there are no accounts; then it must stay. `shared`
-    is the shared token. `is_proxied`: a trusted proxy names the person.
+    is the shared token. `is_proxied`: a trusted proxy names the person. Every method raises
+    `AccountError` if the file cannot be read or written, and `ClientLimitError` if it would wait
+    for the thread, and too many wait.
     """
 
     def __init__(
@@ -80,12 +82,7 @@ class People:
         return self._has_file
 
     def by_cookies(self, headers: Iterable[tuple[bytes, bytes]]) -> Person | None:
-        """The person of a session, by the cookies of a request; None: none is valid.
-
-        Raises:
-            AccountError: the file cannot be read.
-
-        """
+        """The person of a session, by the cookies of a request; None: none is valid."""
         headers, now_s = tuple(headers), time.time()
         if self.shared is not None:
             for cookie in cookies_of(self.shared.cookie_name, headers):
@@ -98,23 +95,13 @@ class People:
         return next((person for person in found if person is not None), None)
 
     def by_token(self, token: str) -> Person | None:
-        """The person of a token; None: it is unknown.
-
-        Raises:
-            AccountError: the file cannot be read.
-
-        """
+        """The person of a token; None: it is unknown."""
         if self.shared is not None and self.shared.accepts(token):
             return SHARED
         return self._file().of_token(digest(token)) if self.has_file else None
 
     def by_proxy(self, name: str) -> Person | None:
-        """The person whom a trusted proxy names; without such an account, they are a viewer.
-
-        Raises:
-            AccountError: the file cannot be read.
-
-        """
+        """The person whom a trusted proxy names; without such an account, they are a viewer."""
         if not is_name(name):
             return None
         found = self._file().of_name(name) if self.has_file else None
@@ -124,10 +111,6 @@ class People:
         """Whether a connection may stay: its session or token is as it was when it began.
 
         None: it needed no credentials then.
-
-        Raises:
-            AccountError: the file cannot be read.
-
         """
         if person is None:
             return not self.is_on
@@ -141,12 +124,7 @@ class People:
         return self._file().of_token(person.secret) == person
 
     def has_account(self, person: Person) -> bool:
-        """Whether it is somebody with an account, however they signed in.
-
-        Raises:
-            AccountError: the file cannot be read.
-
-        """
+        """Whether it is somebody with an account, however they signed in."""
         return self.has_file and self._file().of_name(person.name) is not None
 
     async def check(self, name: str, password: str, address: str) -> Person | None:
@@ -155,8 +133,7 @@ class People:
         Both take the same time.
 
         Raises:
-            ClientLimitError: too many wait, or too many were wrong from that address.
-            AccountError: the file cannot be read.
+            ClientLimitError: too many were wrong from that address.
 
         """
         # Concurrent attempts are bounded by the few that may wait for the thread.
@@ -190,8 +167,7 @@ class People:
         None: the account was removed while its password was checked, or has another one now.
 
         Raises:
-            ClientLimitError: the name signs in too often, or see `write`.
-            AccountError: see `write`.
+            ClientLimitError: the name signs in too often.
 
         """
         if self.shared is not None and person.by == "shared token":
@@ -201,12 +177,7 @@ class People:
         return None if cookie is None else (self._cookie_name(), cookie, SESSION_S)
 
     async def sign_out(self, person: Person, address: str) -> str:
-        """End the session that a request came with; returns its cookie's name.
-
-        Raises:
-            ClientLimitError, AccountError: see `write`.
-
-        """
+        """End the session that a request came with; returns its cookie's name."""
         if self.shared is not None and person.by == "shared token":
             self.shared.sign_out(person)
             return self.shared.cookie_name
@@ -214,13 +185,7 @@ class People:
         return self._cookie_name()
 
     async def write(self, work: Callable[[Accounts, int], ResultT]) -> ResultT:
-        """The result of `work(accounts, now_s)`, on the thread.
-
-        Raises:
-            ClientLimitError: too many wait.
-            AccountError: the file cannot be read or written.
-
-        """
+        """The result of `work(accounts, now_s)`, on the thread."""
 
         def do() -> ResultT:
             with closing(Accounts(self._path, is_writer=True)) as accounts:

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Final
 
 import orjson
+from aiomqtt import MqttError
 
 from lupin_bridge.alarms.board import Change
 from lupin_bridge.feed.source import TwinUnavailableError
@@ -56,7 +57,7 @@ class DailyReport(Periodic):
         super().__init__(self._attempt, POLL_S, "the report of the day", first_s=0.0)
         self._channel, self._of = channel, of
         self._ended_ns = partial(ended_ns, at, of.criteria.clock.zone)
-        known = NotRemembered, PastRefused, TwinUnavailableError, OSError
+        known = NotRemembered, PastRefused, TwinUnavailableError, OSError, MqttError
         self._guard = Guard(f"the report of the day is not sent by {channel.name}", *known)
         # The end of the last day that was sent or skipped; 0: none.
         self._sent_ns = 0

@@ -16,7 +16,6 @@ import logging
 import math
 import secrets
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain, islice
@@ -212,7 +211,7 @@ class Mqtt:
         # Unique: two bridges with the same identifier would disconnect each other for ever.
         self._identifier = f"lupin-twin-{secrets.token_hex(6)}"
         self._has_to_repeat: bool
-        self._reports: deque[tuple[bytes, asyncio.Future[bool]]] = deque()
+        self._connected: Client | None = None
         self._task: asyncio.Task[None] | None = None
         self._is_stopping = self._is_connecting = False
         self._seen_s = 0.0
@@ -224,11 +223,19 @@ class Mqtt:
         self._task = asyncio.create_task(self._run(), name="mqtt")
 
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
-        """Send a report until it is taken; False: it was given up, which is logged."""
-        end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        """Send a report as soon as there is a connection; True: it was taken.
+
+        Raises:
+            MqttError: it was not.
+
+        """
+        while self._connected is None:
+            await asyncio.sleep(POLL_S)
         payload = {"id": report_id, "report": report, "origin": self._look().origin}
-        self._reports.append((orjson.dumps(payload), end))
-        return await end
+        topic, text = self._topics.of(None, "report"), orjson.dumps(payload)
+        await self._connected.publish(topic, text, qos=AT_LEAST_ONCE, retain=True)
+        self.condition.taken()
+        return True
 
     async def stop(self) -> None:
         """Publish `offline` if the broker is connected, and end."""
@@ -263,10 +270,13 @@ class Mqtt:
             if self._is_stopping:
                 return
             try:
+                self._connected = client
                 await self._serve(client)
             except asyncio.CancelledError:
                 await self._announce_shutdown(client)
                 raise
+            finally:
+                self._connected = None
 
     async def _serve(self, client: Client) -> None:
         topics = self._topics
@@ -305,7 +315,6 @@ class Mqtt:
                 self._has_to_repeat, repeated_s = False, time.monotonic()
                 self._mirror.forget()
             self._see()
-            await self._publish_reports(client)
             messages = self._mirror.messages()
             while batch := list(islice(messages, WINDOW)):
                 if time.monotonic() - self._seen_s >= POLL_S:
@@ -317,18 +326,8 @@ class Mqtt:
                 self.condition.taken(len(batch))
                 await asyncio.sleep(len(batch) / MAX_PER_S)
             self._backoff.succeeded()
-            self.condition.waiting = len(self._reports)
+            self.condition.waiting = 0
             await asyncio.sleep(POLL_S)
-
-    async def _publish_reports(self, client: Client) -> None:
-        topic = self._topics.of(None, "report")
-        while self._reports:
-            payload, end = self._reports[0]
-            await client.publish(topic, payload, qos=AT_LEAST_ONCE, retain=True)
-            self._reports.popleft()
-            self.condition.taken()
-            if not end.done():
-                end.set_result(True)
 
     async def _announce_shutdown(self, client: Client) -> None:
         client.timeout = LAST_MESSAGE_S

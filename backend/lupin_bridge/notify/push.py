@@ -10,12 +10,12 @@ posts to any address.
 from __future__ import annotations
 
 import asyncio
-import base64
 import math
 import socket
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from ipaddress import IPv4Address, ip_address, ip_network
 from socket import SOCK_STREAM
@@ -107,9 +107,11 @@ class Push:
 
         """
         from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat  # noqa: PLC0415  # few want it
+        from py_vapid.utils import b64urlencode  # noqa: PLC0415
 
         key = (await self._key()).public_key
-        return encoded(key.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint))
+        raw = key.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint)
+        return str(b64urlencode(raw))
 
     async def _key(self) -> Vapid02:
         from py_vapid import Vapid02  # noqa: PLC0415  # as above
@@ -296,12 +298,7 @@ def parsed(url: str, target: PushTarget) -> Endpoint:
 
 
 def is_public(host: str) -> bool:
-    """Whether an address is reached over the internet alone; one with an IPv4 address leads there.
-
-    Raises:
-        ValueError: it is a name.
-
-    """
+    """Whether an address is reached over the internet alone; NAT64 leads to an IPv4 address."""
     found = ip_address(host.partition("%")[0])
     return (IPv4Address(found.packed[-4:]) if found in _NAT64 else found).is_global
 
@@ -315,24 +312,22 @@ def check_device(device: Device, target: PushTarget) -> None:
     """
     from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePublicKey  # noqa: PLC0415  # as above
 
-    endpoint = parsed(device.endpoint, target)
-    if endpoint.host not in target.private_hosts:
-        try:
-            is_reached = is_public(endpoint.host)
-        except ValueError:  # a name, whose address is checked at each post
-            is_reached = "." in endpoint.host
-        if not is_reached:
-            raise DeviceRefused("endpoint: expected a host that is reached over the internet")
+    parsed(device.endpoint, target)  # its address is checked at each post
     try:
-        EllipticCurvePublicKey.from_encoded_point(SECP256R1(), decoded(device.public_key))
+        EllipticCurvePublicKey.from_encoded_point(SECP256R1(), _decoded(device.public_key))
     except ValueError:
         raise DeviceRefused("keys.p256dh: expected a point of P-256, base64url") from None
-    try:
-        length = len(decoded(device.secret))
-    except ValueError:
-        length = 0
-    if length != 16:
-        raise DeviceRefused("keys.auth: expected 16 bytes, base64url")
+    with suppress(ValueError):
+        if len(_decoded(device.secret)) == 16:
+            return
+    raise DeviceRefused("keys.auth: expected 16 bytes, base64url")
+
+
+def _decoded(text: str) -> bytes:
+    from py_vapid.utils import b64urldecode  # noqa: PLC0415  # as above
+
+    raw: bytes = b64urldecode(text.encode())
+    return raw
 
 
 def encrypted(device: Device, message: bytes) -> bytes:
@@ -343,24 +338,8 @@ def encrypted(device: Device, message: bytes) -> bytes:
     body: bytes = http_ece.encrypt(
         message,
         private_key=ec.generate_private_key(ec.SECP256R1()),
-        dh=decoded(device.public_key),
-        auth_secret=decoded(device.secret),
+        dh=_decoded(device.public_key),
+        auth_secret=_decoded(device.secret),
         version="aes128gcm",
     )
     return body
-
-
-def encoded(raw: bytes) -> str:
-    """As base64url without padding."""
-    return base64.urlsafe_b64encode(raw).decode().rstrip("=")
-
-
-def decoded(text: str) -> bytes:
-    """From base64url, padded or not.
-
-    Raises:
-        ValueError: it is not base64url.
-
-    """
-    plain = text.rstrip("=")
-    return base64.b64decode(plain + "=" * (-len(plain) % 4), b"-_", validate=True)

@@ -19,10 +19,6 @@ from lupin_twin.core.past import PastRow
 GROUP_ROWS: Final = 50_000
 
 
-class MissingPackageError(RuntimeError):
-    """A format needs a package that is not installed; the message says how to install it."""
-
-
 class Csv:
     """CSV, sent as it was packed: call `begin`, then `add` for each packed lot, then `end`."""
 
@@ -114,25 +110,16 @@ class _Sink(io.BytesIO):
 
 
 class Parquet:
-    """Parquet, written group by group of rows; creating it may take as long as an import.
-
-    Raises:
-        MissingPackageError: pyarrow is not installed.
-
-    """
+    """Parquet, written group by group of rows; creating it may take as long as an import."""
 
     name = "parquet"
     media_type = "application/vnd.apache.parquet"
     pack = staticmethod(_pack_columns)
 
     def __init__(self, sensors: Sensors, sensor: str | None, has_site: bool) -> None:
-        try:
-            import pyarrow  # noqa: PLC0415  # the extra `science`, slow to import
-            from pyarrow import parquet  # noqa: PLC0415
-        except ImportError as error:
-            raise MissingPackageError(
-                "Parquet needs pyarrow: pip install 'lupin-twin[science]'; CSV needs nothing"
-            ) from error
+        import pyarrow  # noqa: PLC0415  # the extra `science`, slow to import
+        from pyarrow import parquet  # noqa: PLC0415
+
         kinds = {
             "time": pyarrow.timestamp("ns", tz="UTC"),
             "status": pyarrow.uint8(),

@@ -1,7 +1,8 @@
 """The path from a request to its response: not modified, cached, under way, or computed.
 
 A request is admitted first. Its answer is computed once for all clients that wait for the same one,
-within a time limit, and only while somebody waits. The cache serves later requests at no cost.
+within a time limit, and only while somebody waits. The cache serves later requests at no cost. Past
+a limit, each function here raises an `AdmissionError`; other errors are those of the work.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from typing import Any, Final, TypeVar, cast
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, ValidationError
-from starlette.requests import ClientDisconnect, HTTPConnection
+from starlette.requests import HTTPConnection
 from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.credentials import Person
@@ -36,8 +37,6 @@ from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
 NO_TWIN: Final = "nothing has been received from a twin yet"
-# Time to receive the few kB of a body.
-BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
 
@@ -51,12 +50,6 @@ def refusing(reasons: Mapping[int, str]) -> Documented:
         status: {"model": schema.ErrorMessage, "description": why}
         for status, why in reasons.items()
     }
-
-
-def taking(body: type[BaseModel]) -> dict[str, Any]:
-    """The body that `read_body` reads, for the OpenAPI document."""
-    content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{body.__name__}"}}}
-    return {"requestBody": {"required": True, "content": content}}
 
 
 # The responses that `add_refusals` makes of refusals, for the OpenAPI document.
@@ -73,7 +66,6 @@ NOT_REMEMBERED: Final[Documented] = {
 }
 
 ResultT = TypeVar("ResultT")
-ModelT = TypeVar("ModelT", bound=BaseModel)
 RouteT = TypeVar("RouteT", bound=Callable[..., Any])
 
 
@@ -130,6 +122,19 @@ def person_of(request: HTTPConnection) -> Person | None:
     return found
 
 
+def writer_of(request: HTTPConnection) -> Person | None:
+    """As `person_of`, of a request that writes: its body may have been long in coming.
+
+    Raises:
+        Refused: the session of the request has ended meanwhile.
+
+    """
+    people, person = request.app.state.access.people, person_of(request)
+    if people is not None and person is not None and not people.may_stay(person):
+        raise Refused("the session has ended: sign in again", 401)
+    return person
+
+
 class Refused(Exception):
     """A request that the route refuses; the message names field, value and limit."""
 
@@ -138,39 +143,6 @@ class Refused(Exception):
     ) -> None:
         super().__init__(message)
         self.status, self.headers = status, headers
-
-
-async def read_body(request: Request, model: type[ModelT]) -> ModelT:
-    """A request's JSON body, which the server limits to a few kB.
-
-    Raises:
-        Refused: not JSON, not valid for the model, or not there within `BODY_S`; or the session of
-            the request has ended meanwhile.
-
-    """
-    media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if media_type != "application/json":
-        raise Refused(f"Content-Type is {media_type[:64]!r}, expected application/json", 415)
-    try:
-        async with asyncio.timeout(BODY_S):
-            body = await request.body()
-    except TimeoutError:
-        raise Refused(f"the body did not arrive within {BODY_S:g} s", 408) from None
-    except ClientDisconnect:
-        raise Refused("the client left before its body arrived", CLIENT_DISCONNECTED) from None
-    people, person = request.app.state.access.people, person_of(request)
-    if people is not None and person is not None and not people.may_stay(person):
-        raise Refused("the session has ended: sign in again", 401)
-    try:
-        return model.model_validate(orjson.loads(body))
-    except orjson.JSONDecodeError as error:
-        raise Refused(f"the body is not JSON: {error}") from None
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-        name, why = ".".join(map(str, first["loc"])) or "the body", first["msg"]
-        if first["type"] == "string_pattern_mismatch":  # the only patterns of `routes_schema`
-            why = "it contains a control character"
-        raise Refused(f"{name[:64]}: {why[0].lower()}{why[1:]}") from None
 
 
 def list_header(request: Request, name: str) -> str:
@@ -204,8 +176,19 @@ def add_refusals(app: FastAPI) -> None:
     async def refuse(_request: Request, error: Exception) -> Response:
         return refusal(error)
 
+    async def refuse_body(_request: Request, error: Exception) -> Response:
+        first = cast("RequestValidationError", error).errors()[0]
+        _, *where = first["loc"]
+        name, why = ".".join(map(str, where)), first["msg"]
+        if first["type"] == "json_invalid":
+            name, why = "", f"not JSON: {first['ctx']['error']}"
+        elif first["type"] == "string_pattern_mismatch":  # the only patterns of `routes_schema`
+            why = "it contains a control character"
+        return error_response(f"{name[:64] or 'the body'}: {why[0].lower()}{why[1:]}", 400)
+
     for kind in REFUSALS:
         app.add_exception_handler(kind, refuse)
+    app.add_exception_handler(RequestValidationError, refuse_body)
 
 
 def refusal(error: Exception) -> Response:
@@ -265,13 +248,7 @@ async def respond(
     compute: Callable[[], Coroutine[Any, Any, Answer]],
     etag: str | None = None,
 ) -> Response:
-    """The answer under a key. `etag` is its key in the cache, if it is known beforehand.
-
-    Raises:
-        AdmissionError: past a limit of the client.
-        Exception: whatever `compute` raised.
-
-    """
+    """The answer under a key. `etag` is its key in the cache, if it is known beforehand."""
     bridge = bridge_of(request)
     if etag is not None and has_etag(request, etag):
         return not_modified(etag)
@@ -290,13 +267,7 @@ async def respond(
 
 
 async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Response]]) -> Response:
-    """The result of `work`. It counts as one request until the client has received it.
-
-    Raises:
-        AdmissionError: past a limit of the client.
-        Exception: whatever `work` raised.
-
-    """
+    """The result of `work`. It counts as one request until the client has received it."""
     bridge = bridge_of(request)
     with ExitStack() as held:
         held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
@@ -374,13 +345,7 @@ async def computed(
     *,
     timed: AbstractContextManager[object] = _NOT_TIMED,
 ) -> Answer:
-    """The answer that `write` makes on a worker, put into the cache; `timed` lasts as long.
-
-    Raises:
-        BusyError: one computation too many.
-        Exception: whatever `write` raised.
-
-    """
+    """The answer that `write` makes on a worker, put into the cache; `timed` lasts as long."""
     with bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times, timed:
         answer = await on_worker(bridge, write, cost_s * times)
     bridge.cache.put(key, answer)
@@ -391,13 +356,7 @@ async def computed(
 
 
 async def respond_as_of(request: Request, query: StateQuery) -> Response:
-    """A query as of a moment; headers say how far the answer is complete.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: what the source or the query raised.
-
-    """
+    """A query as of a moment; headers say how far the answer is complete."""
     journal, at_ns = bridge_of(request).source.journal(), query.at_ns or 0
     # As of before the answer. In headers, as the body stays the same when older rows are deleted.
     headers = bodies.moment_headers(journal, at_ns)
@@ -410,13 +369,7 @@ async def respond_as_of(request: Request, query: StateQuery) -> Response:
 
 
 async def respond_past(request: Request, query: Query, kind: str) -> Response:
-    """A query of the past; `kind` is its name in the metrics.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: what the source or the query raised.
-
-    """
+    """A query of the past; `kind` is its name in the metrics."""
     bridge = bridge_of(request)
     header = list_header(request, "if-none-match")
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import ExitStack, aclosing
 from functools import partial
+from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
 from fastapi import APIRouter, Request, Response
@@ -18,16 +19,16 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
-from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
+from lupin_bridge.past.export import Csv, Parquet
 from lupin_bridge.query_string import MAX_SECONDS, OfExport, read
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
     NOT_REMEMBERED,
     ApiRoute,
+    Refused,
     bridge_of,
     client_left,
-    error_response,
     read_route,
     refusing,
     while_client_waits,
@@ -46,12 +47,12 @@ router = APIRouter(route_class=ApiRoute)
 _ANSWERS = {status: what for status, what in NOT_REMEMBERED.items() if status != 304}
 # Worst-case time to import a package, or to write a group of rows, s.
 _WRITE_S = 0.5
+# After the last lot.
+_END: Any = object()
 # The packed rows of an export, in lots.
 Lots = AsyncGenerator[bytes]
 Pack = Callable[[Sequence[PastRow]], bytes]
 Format = type[Csv] | type[Parquet]
-# The writer, the lots after the first, and the first lot; None: there are no rows.
-Begun = tuple[Csv | Parquet, Lots, bytes | None]
 ResultT = TypeVar("ResultT")
 
 
@@ -131,17 +132,14 @@ async def respond_export(
     known: Mapping[str, str],
     has_site: bool = False,
 ) -> Response:
-    """Stream what `rows` yields, in a format; `known` are headers on how far it is complete.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: whatever reading the first rows raised.
-
-    """
+    """Stream what `rows` yields, in a format; `known` are headers on how far it is complete."""
     name = bodies.export_file_name(given, now_ns, kind.name)
     headers = {
         **NEVER_STORE, **known, "Content-Disposition": f'attachment; filename="{name}"',
     }  # fmt: skip
+    if kind is Parquet and find_spec("pyarrow") is None:
+        why = "Parquet needs pyarrow: pip install 'lupin-twin[science]'; CSV needs nothing"
+        raise Refused(why, 501)
     if request.method == "HEAD":
         return Response(headers=headers, media_type=kind.media_type)
     sensors = of.criteria.sensors
@@ -151,38 +149,30 @@ async def respond_export(
         log.warning("the export of %s is old and is ended for another one", client)
         connection.dismiss()
 
-    async def begin() -> Begun:
-        def opened() -> Csv | Parquet:
-            return kind(sensors, given.sensor_type, has_site)
-
-        writer = await _written(of, kind, opened)
-        lots = rows(partial(kind.pack, sensors=sensors))
-        return writer, lots, await anext(lots, None)
-
     with ExitStack() as held:
         # A response that has begun cannot be refused any more: so the first rows are read before.
         with of.admission.request(client, time.monotonic()):
             held.enter_context(of.admission.export(client, time.monotonic(), evict))
-            try:
-                begun = await while_client_waits(request, within_time(of.limits, begin()))
-            except MissingPackageError as error:
-                return error_response(str(error), 501)
-        if begun is None:
+            lots = rows(partial(kind.pack, sensors=sensors))
+            lot = await while_client_waits(request, within_time(of.limits, anext(lots, _END)))
+        if lot is None:
             return Response(status_code=CLIENT_DISCONNECTED)
-        parts = _parts(of, kind, begun)
+        parts = _parts(of, kind, partial(kind, sensors, given.sensor_type, has_site), lot, lots)
         return ExportResponse(
             parts, headers=headers, media_type=kind.media_type, release=held.pop_all().close
         )
 
 
-async def _parts(of: Exporting, kind: Format, begun: Begun) -> Lots:
+async def _parts(
+    of: Exporting, kind: Format, make: Callable[[], Csv | Parquet], lot: bytes, lots: Lots
+) -> Lots:
     """Yield the parts to send; the next lot is read once the part before has been sent."""
-    writer, lots, lot = begun
     async with aclosing(lots):
+        writer = await _written(of, kind, make)
         yield writer.begin()
-        while lot is not None:
+        while lot is not _END:
             yield await _written(of, kind, partial(writer.add, lot))
-            lot = await within_time(of.limits, anext(lots, None))
+            lot = await within_time(of.limits, anext(lots, _END))
         yield await _written(of, kind, writer.end)
 
 

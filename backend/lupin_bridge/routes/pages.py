@@ -27,7 +27,6 @@ from lupin_bridge.routes.answers import (
     json_response,
     list_header,
     person_of,
-    read_body,
     read_route,
     respond,
     while_client_waits,
@@ -143,7 +142,7 @@ ASSETS: Final = Path(__file__).parents[1] / "static" / "assets"
 
 
 @router.post("/api/signin", include_in_schema=False)
-async def sign_in(request: Request) -> Response:
+async def sign_in(request: Request, given: routes_schema.SignIn | None = None) -> Response:
     """Exchange a token, which `AccessControl` has checked, or a password for a session cookie.
 
     Only the sign-in page uses this: programs send `Authorization: Bearer` with every request.
@@ -157,7 +156,8 @@ async def sign_in(request: Request) -> Response:
             return error_response(
                 "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
             )
-        given = await read_body(request, routes_schema.SignIn)
+        if given is None:
+            return error_response("the body is empty, expected a name and a password", 400)
         person = await while_client_waits(
             request, people.check(given.name, given.password, address)
         )

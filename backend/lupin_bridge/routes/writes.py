@@ -36,11 +36,10 @@ from lupin_bridge.routes.answers import (
     computed,
     json_response,
     person_of,
-    read_body,
     read_route,
     refusing,
     respond,
-    taking,
+    writer_of,
 )
 from lupin_bridge.routes.pages import language_of
 from lupin_bridge.serving.admission import AdmissionError, Answer
@@ -112,13 +111,11 @@ async def notes_route(request: Request) -> Response:
     summary="Acknowledge or shelve an alarm, or comment on something",
     status_code=201,
     responses={201: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
-    openapi_extra=taking(routes_schema.NoteDraft),
 )
-async def write_note(request: Request) -> Response:
+async def write_note(request: Request, draft: routes_schema.NoteDraft) -> Response:
     """Requires the role operator. Of two notes of one kind on an alarm, the later one counts."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
-    draft = await read_body(request, routes_schema.NoteDraft)
     note = await _write(request, bridge, _checked(draft, person, bridge))
     return json_response(orjson.dumps(note_json(note, {})), 201)
 
@@ -150,7 +147,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
 
 def _writer(request: Request, bridge: Bridge) -> Person:
     """The person who writes; refuses whoever may not."""
-    person = person_of(request)
+    person = writer_of(request)
     if person is None or not person.name:
         raise Refused(
             "notes are written by people: sign in with an account of the role operator "
@@ -284,14 +281,13 @@ MAX_AHEAD_S: Final = 10
             }
         ),
     },
-    openapi_extra=taking(routes_schema.ObservationDraft),
 )
-async def post_observation(request: Request) -> Response:
+async def post_observation(request: Request, draft: routes_schema.ObservationDraft) -> Response:
     """Requires a token with the role writer. The same tag at the same `observed_at` counts once.
 
     The twin applies its own rules, and reports on `/diagnostics` what it drops.
     """
-    bridge, person = bridge_of(request), person_of(request)
+    bridge, person = bridge_of(request), writer_of(request)
     if person is None or person.role != WRITER:
         raise Refused(
             f"observations require a token of the role {WRITER} "
@@ -305,7 +301,6 @@ async def post_observation(request: Request) -> Response:
     limits = bridge.limits
     most = f"{limits.observation_burst} observations and {limits.observations_per_s:g} a second"
     bridge.observations_pace.charge(person.name, time.monotonic(), f"posted more than {most}")
-    draft = await read_body(request, routes_schema.ObservationDraft)
     now_ns = bridge.ros_time_ns
     if now_ns is None or not bridge.status.is_live:
         raise TwinUnavailableError("the twin is silent: post it again later")
@@ -372,11 +367,10 @@ async def key_route(request: Request) -> Response:
             }
         ),
     },
-    openapi_extra=taking(routes_schema.PushSubscription),
 )
-async def subscribe(request: Request) -> Response:
+async def subscribe(request: Request, given: routes_schema.PushSubscription) -> Response:
     """An account may have ten browsers; an eleventh replaces the oldest."""
-    push, person = bridge_of(request).outward.push, person_of(request)
+    push, person = bridge_of(request).outward.push, writer_of(request)
     access: Access = request.app.state.access
     if push is None or access.people is None:
         raise Refused("this bridge has no Web Push: start it with --push-contact", 404)
@@ -384,7 +378,6 @@ async def subscribe(request: Request) -> Response:
     if person is None or not access.people.has_account(person):
         raise Refused("notifications require an account: sign in by name", 403)
     bridge_of(request).notes.pace.charge(person.name, time.monotonic(), _TOO_MANY_NOTES)
-    given = await read_body(request, routes_schema.PushSubscription)
     if given.keys is None:
         await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))
         return Response(status_code=204, headers=NEVER_STORE)

@@ -302,7 +302,7 @@ class HttpConnection(H11Protocol, SmallReads):
     def waiting_since_s(self) -> float | None:
         """Since when the client has requested, or taken, nothing; None: it is being served."""
         cycle = cast("RequestResponseCycle | None", self.cycle)
-        is_at_work = cycle is not None and not cycle.response_complete
+        is_at_work = cycle is not None and not (cycle.more_body or cycle.response_complete)
         is_stuck = self.flow.write_paused or self.transport.is_closing()
         return None if is_at_work and not is_stuck else self._idle_since_s
 

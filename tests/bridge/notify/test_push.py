@@ -23,6 +23,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from py_vapid import Vapid02
+from py_vapid.utils import b64urlencode
 
 from lupin_bridge.access.accounts import MAX_DEVICES, Device
 from lupin_bridge.access.people import People
@@ -31,7 +32,7 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
-from lupin_bridge.notify.push import Push, encoded, push_text
+from lupin_bridge.notify.push import Push, push_text
 from lupin_bridge.notify.webhook import post
 from lupin_bridge.past.report_page import PageText
 from lupin_bridge.settings import Settings
@@ -73,7 +74,7 @@ class Phone:
         """As a browser sends it."""
         public = self.private.public_key()
         raw = public.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint)
-        keys = {"p256dh": encoded(raw), "auth": encoded(self.auth)}
+        keys = {"p256dh": b64urlencode(raw), "auth": b64urlencode(self.auth)}
         return {"endpoint": self.endpoint, "expirationTime": None, "keys": keys}
 
     def read(self, posted: Posted) -> dict[str, str]:
@@ -339,11 +340,6 @@ def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(open_to:
     "endpoint",
     [
         "http://push.example/x",
-        "https://127.0.0.1/x",
-        "https://[::ffff:10.0.0.1]/x",
-        "https://[64:ff9b::10.0.0.1]/x",
-        "https://169.254.169.254/latest/meta-data",
-        "https://intranet/x",
         "https://push.example:22/x",
         "https://anna:secret@push.example/x",
         "",
@@ -366,8 +362,14 @@ def test_an_invalid_key_is_refused(open_to: Live, name: str, value: str) -> None
     assert (answer.status_code, f"keys.{name}" in answer.text) == (400, True), answer.text
 
 
-@pytest.mark.parametrize("host", ["127.1", "0x7f.0.0.1"])
-def test_nothing_is_posted_to_a_name_that_leads_into_a_private_network(
+@pytest.mark.parametrize(
+    "host",
+    [
+        *("127.0.0.1", "127.1", "0x7f.0.0.1", "169.254.169.254"),
+        *("[::ffff:10.0.0.1]", "[64:ff9b::10.0.0.1]"),
+    ],
+)
+def test_nothing_is_posted_to_a_host_that_leads_into_a_private_network(
     open_to: Live, host: str
 ) -> None:
     """Its address is checked before each post, and is the one that is connected to."""
@@ -413,7 +415,8 @@ def test_notified_browsers_per_person_are_limited_and_the_audit_trail_has_each_o
         for number in range(12):
             subscribe(anna, open_to.phone(f"many{number}"))
             subscribe(anna, open_to.phone(f"many{number}"))
-        answers = [anna.post("/api/push", json={}) for _ in range(NOTE_BURST + 100)]
+        gone = {"endpoint": "https://push.example/"}
+        answers = [anna.post("/api/push", json=gone) for _ in range(NOTE_BURST + 100)]
     assert len(open_to.devices()) == 10
     assert added() == before + 12
     assert "anna has written more than" in answers[-1].text, "or they would fill the trail"

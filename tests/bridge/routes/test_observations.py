@@ -17,7 +17,7 @@ from lupin_bridge.serving.admission import Limits
 from tests.support import raw_http
 from tests.support.journal import select
 from tests.support.people import OWN, TOKEN, add, remove, signed_in
-from tests.support.processes import constants, limits, lupin_twin, twin_node, url_of
+from tests.support.processes import limits, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
@@ -39,9 +39,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def live(folder: Path) -> Iterator[Bridge]:
-    soon = constants(**{"lupin_bridge.routes.answers:BODY_S": 1.5})
     options = ("--accounts", str(folder / "accounts.sqlite"), *ON, *limits(client_timeout_s=3.0))
-    with bridge(*options, *soon, "--ros-args", "-p", f"journal:={folder / 'j.sqlite'}") as running:
+    with bridge(*options, "--ros-args", "-p", f"journal:={folder / 'j.sqlite'}") as running:
         running.peer.wait_for_twin()
         yield running
 
@@ -129,8 +128,9 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
 @pytest.mark.parametrize(
     ("body", "complaint"),
     [
-        (b"", "the body is not JSON"),
-        (b'{"tag_id": "bad", "readings": {"t": NaN}}', "the body is not JSON"),
+        (b"", "the body: field required"),
+        (b"{", "the body: not JSON: "),
+        (b'{"tag_id": "bad", "readings": {"t": NaN}}', "readings.t: input should be a finite"),
         (b'{"tag_id": "bad", "readings": {"t": 1e999}}', ""),
         ([], "the body: input should be"),
         ({**GOOD, "readings": {}}, "readings: dictionary should have at least 1"),
@@ -173,7 +173,7 @@ def test_a_client_without_the_right_is_refused(live: Bridge) -> None:
     # A foreign page has no token; even with one, it may not post.
     assert post(live.url, body, Origin="http://evil.example").status_code == 403
     assert post(live.url, body, Host="evil.example").status_code == 403
-    assert post(live.url, body, Content_Type="text/plain").status_code == 415
+    assert post(live.url, body, Content_Type="text/plain").status_code == 400
 
 
 def test_a_writer_posts_and_does_nothing_else(live: Bridge) -> None:
@@ -206,7 +206,7 @@ def test_bodies_are_bounded_and_a_partial_one_times_out(live: Bridge, folder: Pa
     message = raw_http.answer(live.url, head("esp", len(json.dumps(huge))))
     assert raw_http.status(message) == 413
     half = head("esp", 100) + b'{"tag_id": "half", '
-    assert raw_http.status(raw_http.answer(live.url, half)) == 408
+    assert raw_http.answer(live.url, half) == b"", "cut off, as every request that lasts so long"
     assert rows(folder, "huge") == rows(folder, "half") == []
 
 

@@ -274,7 +274,7 @@ def test_a_comment_on_a_tag_or_the_greenhouse_is_found_by_subject_and_period(liv
         ({"X-Lupin-Twin": ""}, 201),
         ({"Origin": "https://evil.example"}, 403),
         ({"Host": "evil.example"}, 403),
-        ({"Content-Type": "text/plain"}, 415),
+        ({"Content-Type": "text/plain"}, 400),
         ({"X-HTTP-Method-Override": "DELETE"}, 201),
     ],
 )

@@ -17,7 +17,7 @@ from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import DropCounts
 
-MAX_FRAMES: Final = 1_000
+MAX_FRAMES: Final = 5_000
 # A chain goes from a tag over camera, arm, base and odometry to the map; a longer one is a loop.
 MAX_STEPS: Final = 32
 MAX_NAME: Final = 256
@@ -57,25 +57,19 @@ class Transform:
 
 
 class Frames:
-    """The latest transform of each frame.
-
-    Too many moving frames replace the one updated longest ago. A static frame is sent only once, so
-    it stays.
-    """
+    """The latest transform of each frame."""
 
     def __init__(self) -> None:
-        # The one updated longest ago is the first.
-        self._moving: dict[str, Transform] = {}
-        self._static: dict[str, Transform] = {}
+        self._steps: dict[str, Transform] = {}
 
     def __contains__(self, frame: str) -> bool:
-        return frame in self._moving or frame in self._static
+        return frame in self._steps
 
     def put(self, frame: str, transform: Transform) -> None:
         """Store a transform as the frame's latest.
 
         Raises:
-            FrameError: not finite, without rotation, a bad name, or one static frame too many.
+            FrameError: not finite, without rotation, a bad name, or one frame too many.
 
         """
         numbers = (*transform.move, *transform.turn)
@@ -84,18 +78,13 @@ class Frames:
             raise FrameError(f"the transform to {frame[:64]!r} has {numbers}, which is invalid")
         if not 0 < len(frame) <= MAX_NAME or not 0 < len(transform.parent) <= MAX_NAME:
             raise FrameError(f"a frame's name has {len(frame)} characters, the limit: {MAX_NAME}")
-        table = self._moving if transform.stamp_ns is not None else self._static
-        if table is self._static and frame not in table and len(table) >= MAX_FRAMES:
-            raise FrameError(f"more than {MAX_FRAMES} static frames, the limit")
-        self._moving.pop(frame, None)
-        self._static.pop(frame, None)
-        table[frame] = transform
-        if len(table) > MAX_FRAMES:
-            del table[next(iter(table))]
+        if frame not in self._steps and len(self._steps) >= MAX_FRAMES:
+            raise FrameError(f"more than {MAX_FRAMES} frames, the limit")
+        self._steps[frame] = transform
 
     def stamp_ns(self, frame: str) -> int | None:
         """Stamp of the frame's own transform; None if there is none, or it is static."""
-        found = self._moving.get(frame)
+        found = self._steps.get(frame)
         return None if found is None else found.stamp_ns
 
     def place(
@@ -111,7 +100,7 @@ class Frames:
         for _ in range(MAX_STEPS):
             if name == inside:
                 return at
-            step = self._moving.get(name) or self._static.get(name)
+            step = self._steps.get(name)
             if step is None:
                 raise FrameError(
                     f"TF has no path from {frame!r} to {inside!r} (frame_id): it ends at {name!r}"

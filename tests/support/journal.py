@@ -68,7 +68,7 @@ def past_write(number: int, run: int, row: Observation) -> Observation:
 @contextmanager
 def opened(path: Path, limits: Limits = LIMITS) -> Iterator[JournalFile]:
     """A journal's file, in this thread."""
-    file = JournalFile(path, limits, is_sound=False)
+    file = JournalFile(path, limits)
     try:
         yield file
     finally:

@@ -390,7 +390,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
     new = count = 0
     with (
         closing(Lock(path, "lupin-twin import")),
-        closing(JournalFile(path, _NO_LIMITS, is_sound=False)) as file,
+        closing(JournalFile(path, _NO_LIMITS)) as file,
     ):
         with closing(open_named(path)) as connection:
             known = runs(connection.execute)

@@ -6,7 +6,6 @@ import sqlite3
 import time
 from contextlib import closing
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from pkgutil import resolve_name
 from random import Random
@@ -18,7 +17,7 @@ from lupin_twin.core.state import Write
 from lupin_twin.journal.paths import Syncing
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Turn
-from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.salvage import salvage
 from lupin_twin.journal.schema import DamagedFile, open_writer
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import (
@@ -134,7 +133,7 @@ DAMAGED, FULL = DamagedFile("as SQLite finds it"), OSError("the disk is full")
     [
         ({APPEND: FULL}, False),
         ({APPEND: DAMAGED}, True),
-        ({APPEND: DAMAGED, "file.salvage": FULL}, True),
+        ({APPEND: DAMAGED, "writer.salvage": FULL}, True),
         ({APPEND: DAMAGED, "salvage.open_writer": FULL}, True),
     ],
 )
@@ -321,43 +320,21 @@ def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
     assert select(path, "SELECT count(*) FROM scan") == [(0,)]
 
 
-@pytest.mark.parametrize("is_there", [True, False])
-def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
-    append(path, [scan(at_ns=NOW + n) for n in range(300)])
-    aside = quarantine(path)
-    if not is_there:  # the file was removed
-        aside.unlink()
-    with opened(path):
-        pass
-    assert select(path, "SELECT count(*) FROM scan") == [(300 if is_there else 0,)]
-    assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
-
-
-@pytest.mark.parametrize("renamed", [0, 1, 2])
-def test_a_quarantine_that_was_killed_is_completed(
-    path: Path, monkeypatch: pytest.MonkeyPatch, renamed: int
+@pytest.mark.parametrize("at", ["os.link", "pathlib.Path.replace"])
+def test_a_salvage_that_was_killed_is_done_again(
+    path: Path, monkeypatch: pytest.MonkeyPatch, at: str
 ) -> None:
-    left = path.with_name("left.sqlite")
-    with opened(path) as file:
-        run = file.start(CLOCK, is_believed=False).run
-        file.append([(run, scan(at_ns=NOW + n)) for n in range(300)])
-        for end in ("", "-wal"):  # as a killed twin leaves them
-            shutil.copy(f"{path}{end}", f"{left}{end}")
-    rename, done = Path.rename, count()
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
 
-    def killed(old: Path, new: Path) -> None:
-        if next(done) == renamed:
-            raise KeyboardInterrupt
-        rename(old, new)
-
+    append(path, [scan(at_ns=NOW + n) for n in range(300)])
     with monkeypatch.context() as killing:
-        killing.setattr(Path, "rename", killed)
+        killing.setattr(at, killed)
         with pytest.raises(KeyboardInterrupt):
-            quarantine(left)
-    with opened(left) as file:
-        assert Path(file.quarantined).name.startswith("left.sqlite.damaged-")
-    assert select(left, "SELECT count(*) FROM scan") == [(300,)]
-    assert not left.with_name("left.sqlite.new").exists()
+            salvage(path)
+    assert scans_in(path) == 300
+    assert scans_in(salvage(path)) == scans_in(path) == 300
+    assert not path.with_name("j.sqlite.new").exists()
 
 
 def test_a_failed_sync_is_reported_with_the_next_write(

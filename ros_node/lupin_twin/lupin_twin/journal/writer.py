@@ -23,6 +23,7 @@ from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
 from lupin_twin.field.explored import OccupancyMap, text_of
+from lupin_twin.journal.checking import is_damaged
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.paths import InUse, Lock
@@ -30,7 +31,7 @@ from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
-from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.salvage import salvage
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 from lupin_twin.journal.writes import NoteQueue
 
@@ -298,16 +299,9 @@ class Journal:
         self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self._lock is None:
             self._lock = Lock(self._path, self._holder)
-        # A damaged one is quarantined, whatever its version.
-        if self._is_sound is False:
-            quarantine(self._path)
-            self._is_sound = None  # if its salvage fails, only that is done again
-        elif old_version(self._path) is not None:
-            self._left_out = upgrade(self._path, self._report_progress)
-        file = JournalFile(self._path, self._limits, is_sound=bool(self._is_sound))
+        self._mend()
+        file = JournalFile(self._path, self._limits)
         try:
-            self._is_sound = True
-            self._quarantined = file.quarantined or self._quarantined
             file.note_world(self._world)
             if self._file is not None:
                 for run in self._runs:
@@ -331,6 +325,16 @@ class Journal:
                     self._stop.wait(self._gather_s())
         finally:
             file.close()
+
+    def _mend(self) -> None:
+        """Upgrade a file of an earlier version, and salvage a damaged one, whatever its version."""
+        if self._is_sound is None:
+            if old_version(self._path) is not None:
+                self._left_out = upgrade(self._path, self._report_progress)
+            self._is_sound = not is_damaged(self._path)
+        if not self._is_sound and self._path.exists():
+            self._quarantined = str(salvage(self._path))
+        self._is_sound = True
 
     def _gather_s(self) -> float:
         *_, oldest_s = self._pending.counts()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -49,16 +48,6 @@ PURGE_EVERY_S: Final = 60.0
 _POLL_EVERY_S: Final = 1.0
 # Least time between two maps that are written: a robot that explores sends one every second.
 _MAP_REST_S: Final = 10.0
-
-# Errors that are caused by a single row, which is then refused.
-_ROW_ERRORS: Final = (
-    ValueError,
-    OverflowError,
-    TypeError,
-    sqlite3.DataError,
-    sqlite3.IntegrityError,
-    sqlite3.InterfaceError,
-)
 
 
 class JournalFile:
@@ -232,27 +221,13 @@ class JournalFile:
 
     # --- writing ------------------------------------------------------------------------------
 
-    def append(self, rows: Sequence[tuple[Run, Write]]) -> tuple[int, int]:
-        """Write rows in one transaction; returns how many were new, and how many were refused.
+    def append(self, rows: Sequence[tuple[Run, Write]]) -> int:
+        """Write rows in one transaction; returns how many were new.
 
         Raises:
             sqlite3.Error, OSError: nothing was written.
 
         """
-        if not rows:
-            return 0, 0
-        try:
-            return self._append(rows), 0
-        except _ROW_ERRORS:
-            written = refused = 0
-        for entry in rows:
-            try:
-                written += self._append([entry])
-            except _ROW_ERRORS:
-                refused += 1
-        return written, refused
-
-    def _append(self, rows: Sequence[tuple[Run, Write]]) -> int:
         with self._transaction():
             written = 0
             for root, of_run in groupby(rows, lambda entry: entry[0].root):

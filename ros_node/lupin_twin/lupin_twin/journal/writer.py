@@ -382,17 +382,12 @@ class Journal:
                 return
             # Entries of an era without a run yet come after all others.
             known = [entry for entry in entries if entry.era <= len(self._runs)]
-            written, refused = file.append(
+            written = file.append(
                 [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]
             )
             self._pending.done(len(known))
             self._failures = 0
-            self._reported = replace(
-                self._reported,
-                written=self._reported.written + written,
-                refused=self._reported.refused + refused,
-                repeated=self._reported.repeated + len(known) - written - refused,
-            )
+            self._reported = replace(self._reported, written=self._reported.written + written)
             lost_ns = self._pending.take_lost()
             if lost_ns is not None:
                 file.note_lost(self._runs[-1], lost_ns)

@@ -82,9 +82,10 @@ def replace_journal(path: Path, new: Path, end: str) -> Path:
     """Put a new file in a journal's place; the old one and its WAL get another name with this end.
 
     Returns that name. No data is deleted or overwritten. If this is killed, the old file is still
-    in its place, or the new one is.
+    in its place, or `finish_replacing` puts the new one there.
     """
     sync(new)
+    new.chmod(path.stat().st_mode & 0o777)
     for number in count():
         old = path.with_name(path.name + end + (f"-{number}" if number else ""))
         if not old.exists() or old.samefile(path):  # killed after this step
@@ -94,12 +95,24 @@ def replace_journal(path: Path, new: Path, end: str) -> Path:
         if size_of(one) and not other.exists():
             _give_name(one, other)
     sync(path.parent)
-    # SQLite would take them for those of the new file. Who reads the old one has them open.
-    delete(path, "-wal", "-shm")
-    new.chmod(path.stat().st_mode & 0o777)
-    new.replace(path)
-    sync(path.parent)
+    new.rename(_ready(path))
+    path.unlink()
+    finish_replacing(path)
     return old
+
+
+def finish_replacing(path: Path) -> None:
+    """Put a new file in the place of a journal that is gone, if there is one."""
+    if _ready(path).exists() and not path.exists():
+        # SQLite would take them for those of the new file. Who reads the old one has them open, and
+        # nobody opens them meanwhile: there is no journal.
+        delete(path, "-wal", "-shm")
+        _ready(path).rename(path)
+        sync(path.parent)
+
+
+def _ready(path: Path) -> Path:
+    return path.with_name(path.name + ".new")
 
 
 def _give_name(path: Path, other: Path) -> None:
@@ -189,7 +202,7 @@ def salvage(path: Path) -> Path:
         sqlite3.Error, OSError: the damaged file is still in its place: the disk is full, say.
 
     """
-    new, mended = (path.with_name(path.name + end) for end in (".new", ".mended"))
+    new, mended = (path.with_name(path.name + end) for end in (".salvage", ".mended"))
     delete(new)
     try:
         with closing(open_writer(new)) as target:

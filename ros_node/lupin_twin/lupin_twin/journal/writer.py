@@ -30,7 +30,7 @@ from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
-from lupin_twin.journal.salvage import salvage
+from lupin_twin.journal.salvage import finish_replacing, salvage
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 from lupin_twin.journal.writes import NoteQueue
 
@@ -327,6 +327,7 @@ class Journal:
 
     def _mend(self) -> None:
         """Upgrade a file of an earlier version, and salvage a damaged one, whatever its version."""
+        finish_replacing(self._path)
         if self._is_sound is None:
             if old_version(self._path) is not None:
                 self._left_out = upgrade(self._path, self._report_progress)

@@ -58,7 +58,7 @@ def write(folder: Path) -> None:
     reported = list(islice(received, SCANS))
     paced = list(islice(received, 2_000))
     path = folder / "log.sqlite"
-    file = JournalFile(path, LIMITS, is_sound=True)
+    file = JournalFile(path, LIMITS)
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
 

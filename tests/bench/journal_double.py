@@ -119,7 +119,7 @@ def _folder() -> Path:
 def fill(path: Path, greenhouse: Greenhouse) -> Filled:
     """Write all observations of a greenhouse, as its twin would."""
     readings = 0
-    file = JournalFile(path, LIMITS, is_sound=True)
+    file = JournalFile(path, LIMITS)
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
         received = greenhouse.rows()

@@ -68,7 +68,7 @@ def past_write(number: int, run: int, row: Observation) -> Observation:
 @contextmanager
 def opened(path: Path, limits: Limits = LIMITS) -> Iterator[JournalFile]:
     """A journal's file, in this thread."""
-    file = JournalFile(path, limits, is_sound=False)
+    file = JournalFile(path, limits)
     try:
         yield file
     finally:
@@ -96,7 +96,7 @@ def _now(path: Path) -> Clock:
     return CLOCK
 
 
-def append(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
+def append(path: Path, rows: Iterable[Write], now: Clock | None = None) -> int:
     """Write rows, in one run of a twin; returns the result of `JournalFile.append`."""
     with opened(path) as file:
         run = file.start(now or _now(path), is_believed=True).run

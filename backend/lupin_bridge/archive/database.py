@@ -351,14 +351,6 @@ def check(connection: Any) -> list[str]:
     return wrong
 
 
-_NAMED: Final = (
-    "SELECT site FROM site WHERE %(site)s::text IS NULL OR site = %(site)s ORDER BY site"
-)
-# The age of a simulation's rows counts from their arrival.
-_RUNS: Final = (
-    "SELECT run, CASE is_simulated WHEN 0 THEN 0 ELSE begun_arrival_ns - begun_stamp_ns END"
-    " FROM run WHERE site = %s AND joins IS NULL ORDER BY run"
-)
 # Monthly partitions that are over: their names in both tables.
 _MONTHS: Final = (
     "SELECT relname, replace(relname, 'scan', 'look') FROM pg_class WHERE oid IN"
@@ -375,13 +367,20 @@ _UPTO: Final = (
     " (SELECT site, run, stamp_ns FROM {0} JOIN series USING (site, series)"
     " UNION ALL SELECT site, run, stamp_ns FROM {1}) AS gone GROUP BY site, run "
 ) + META_AGAIN
+# The age of a simulation's rows counts from their arrival.
 _DELETE: Final = (
-    "WITH scans AS (DELETE FROM scan USING series WHERE scan.site = %(site)s"
-    " AND series.site = %(site)s AND scan.series = series.series AND run = %(run)s"
-    " AND stamp_ns < %(before)s RETURNING stamp_ns),"
-    " looks AS (DELETE FROM look WHERE site = %(site)s AND run = %(run)s"
-    " AND stamp_ns < %(before)s RETURNING stamp_ns)"
-    " SELECT count(*), max(stamp_ns) FROM (TABLE scans UNION ALL TABLE looks) AS gone"
+    "WITH kept AS (SELECT site, run, %(before)s - CASE is_simulated WHEN 0 THEN 0"
+    " ELSE begun_arrival_ns - begun_stamp_ns END AS from_ns FROM run"
+    " WHERE joins IS NULL AND (%(site)s::text IS NULL OR site = %(site)s)),"
+    " scans AS (DELETE FROM scan USING series, kept WHERE scan.site = kept.site"
+    " AND series.site = kept.site AND scan.series = series.series AND series.run = kept.run"
+    " AND stamp_ns < from_ns RETURNING kept.site, kept.run, stamp_ns),"
+    " looks AS (DELETE FROM look USING kept WHERE look.site = kept.site AND look.run = kept.run"
+    " AND stamp_ns < from_ns RETURNING kept.site, kept.run, stamp_ns),"
+    " gone AS (TABLE scans UNION ALL TABLE looks),"
+    " noted AS (INSERT INTO meta SELECT site, 'purged_ns:' || run, max(stamp_ns)::text FROM gone"
+    f" GROUP BY site, run {META_AGAIN})"
+    " SELECT site, count(*) FROM gone GROUP BY site ORDER BY site"
 )
 
 
@@ -396,8 +395,8 @@ def retain(connection: Any, days: float, site: str | None) -> Iterator[str]:
 
     """
     before = datetime.now(UTC) - timedelta(days=days)
-    sites = [name for (name,) in connection.execute(_NAMED, {"site": site}).fetchall()]
-    if site is not None and not sites:
+    known = connection.execute("SELECT count(*) FROM site WHERE site = %s", (site,)).fetchone()
+    if site is not None and known == (0,):
         raise ArchiveError(f"the archive has no site {site!r}")
     for names in connection.execute(_MONTHS, (before,)).fetchall():
         with connection.transaction():
@@ -407,18 +406,6 @@ def retain(connection: Any, days: float, site: str | None) -> Iterator[str]:
             connection.execute(_UPTO.format(*names))
             connection.execute("DROP TABLE {}, {}".format(*names))
         yield f"{names[0][-7:].replace('_', '-')}: the whole month"
-    for name in sites:
-        count = sum(_of_runs(connection, name, int(before.timestamp() * 10**9)))
-        if count:
-            yield f"{name}: {count:,} scans and inspections"
-
-
-def _of_runs(connection: Any, site: str, before_ns: int) -> Iterator[int]:
-    for run, lead_ns in connection.execute(_RUNS, (site,)).fetchall():
-        gone = {"site": site, "run": run, "before": before_ns - lead_ns}
-        with connection.transaction():
-            count, upto_ns = connection.execute(_DELETE, gone).fetchone()
-            if count:
-                row = (site, f"purged_ns:{run}", str(upto_ns))
-                connection.execute(f"INSERT INTO meta VALUES (%s, %s, %s) {META_AGAIN}", row)
-        yield count
+    gone = {"before": int(before.timestamp() * 10**9), "site": site}
+    for name, count in connection.execute(_DELETE, gone).fetchall():
+        yield f"{name}: {count:,} scans and inspections"

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.archive.database import ArchiveError
 from lupin_twin.core.past import Event
 from lupin_twin.journal import sql
 from lupin_twin.journal.appending import PURGED_SEQ, Appender
@@ -146,15 +145,9 @@ class Source:
         return {note_id for (note_id,) in self.log.execute(sql.NOTE_IDS)}
 
     def batch(self, epoch: Epoch) -> Batch:
-        """The next batch, as of one moment, and synced to the disk.
-
-        Raises:
-            ArchiveError: the journal is being salvaged.
-
-        """
+        """The next batch, as of one moment, and synced to the disk."""
         after = epoch.forwarded_seq
         with one_view(self._connection):
-            self._refuse_salvaged()
             found, upto, is_all = rows_behind(self.log, after, _ROWS, every=True)
             found += [("meta", row) for row in self._facts(epoch)]
             since: list[tuple[int, int]] = []
@@ -179,11 +172,9 @@ class Source:
         """Have the twin keep what is not in the archive yet.
 
         Raises:
-            ArchiveError: it cannot be forwarded now.
             OSError: nothing can be written beside the journal.
 
         """
-        self._refuse_salvaged()
         if not forwarded_seq(self._path, self.log.journal_id):
             self.note(0)
 
@@ -191,11 +182,6 @@ class Source:
         """Note beside the journal that its rows up to a number are in the archive."""
         if forwarded_seq(self._path, self.log.journal_id) != seq:
             note_forwarded(self._path, self.log.journal_id, seq)
-
-    def _refuse_salvaged(self) -> None:
-        # Then rows come in any order.
-        if self.log.meta("salvage"):
-            raise ArchiveError(f"the journal {self._path} is being saved from damage")
 
     def _facts(self, epoch: Epoch) -> Iterator[Row]:
         """The rows of the file's `meta` that are true of the archive too.

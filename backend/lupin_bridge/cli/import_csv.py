@@ -390,7 +390,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
     new = count = 0
     with (
         closing(Lock(path, "lupin-twin import")),
-        closing(JournalFile(path, _NO_LIMITS, is_sound=False)) as file,
+        closing(JournalFile(path, _NO_LIMITS)) as file,
     ):
         with closing(open_named(path)) as connection:
             known = runs(connection.execute)
@@ -416,10 +416,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                     arrival_ns=stamp_ns,
                 )
                 rows.append((known[0] if span is None else by_id[span.run], scan))
-            written, refused = file.append(rows)
-            new += written
-            if refused:
-                raise CommandError(f"{refused} rows could not be written into {path}")
+            new += file.append(rows)
         for run in known[-1:]:
             # A tag's place holds from before its first reading on, and the first one stays.
             file.append(

@@ -314,18 +314,6 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
         process.wait_for_output(f"site {archive.site} is forwarded to")
 
 
-def test_a_journal_that_is_saved_from_damage_waits_until_it_is(
-    archive: Archive, journal: Path
-) -> None:
-    append(journal, scans(0, 50))
-    with closing(sqlite3.connect(journal)) as connection, connection:
-        connection.execute("INSERT INTO meta VALUES ('local', 'salvage', 'somewhere')")
-    refused = run(*words(archive, journal))
-    assert refused.returncode == 1
-    assert "being saved from damage" in refused.stderr
-    assert archive.rows()["scan"] == []
-
-
 def test_what_is_wrong_is_said_in_one_line(archive: Archive, journal: Path) -> None:
     append(journal, scans(0, 5))
     for given, code, said in (

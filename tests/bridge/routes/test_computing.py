@@ -101,7 +101,8 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Held:
 
 def fields_at(workers: Workers) -> tuple[int, int]:
     """How many fields wait, and how many are computed."""
-    return workers.waiting, workers.running
+    running = sum(job.running() for job in tuple(workers.jobs))
+    return len(workers.jobs) - running, running
 
 
 def send(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:

@@ -111,7 +111,6 @@ def test_the_journals_report_is_parsed_back() -> None:
         written=7,
         waiting=2,
         lost=3,
-        refused=1,
         quarantined="/j.sqlite.damaged",
         simulated_ns=(1_763_440_800_000_000_001, 1_763_700_000_000_000_000),
         complete_ns=1_763_700_000_000_000_002,

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from lupin_twin.journal import schema
-from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.checking import is_damaged
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     UPGRADED,
@@ -39,7 +39,7 @@ def test_a_foreign_database_is_reported_and_left_alone(tmp_path: Path) -> None:
         with pytest.raises(Foreign, match="not a journal of lupin-twin"):
             opens(foreign)
     assert foreign.read_bytes() == before
-    assert find_damage(foreign) is None
+    assert not is_damaged(foreign)
 
 
 @pytest.mark.parametrize("after", range(6))
@@ -77,7 +77,7 @@ def test_a_file_being_created_is_called_empty_and_not_damaged(tmp_path: Path) ->
         maker.execute("CREATE TABLE meta (x)")
         with pytest.raises(Empty, match="is empty: a journal that is just being created"):
             open_reader(path)
-        assert find_damage(path) is None
+        assert not is_damaged(path)
 
 
 @pytest.mark.parametrize("version", [1, 2, *UPGRADED, VERSION + 1])
@@ -98,7 +98,7 @@ def test_a_file_that_is_no_database_is_damaged(tmp_path: Path) -> None:
     with pytest.raises(sqlite3.DatabaseError) as caught:
         open_writer(text)
     assert is_damage_error(caught.value)
-    assert find_damage(text)
+    assert is_damaged(text)
 
 
 def test_a_path_that_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_a_flipped_letter_in_a_table_definition_is_damage(path: Path) -> None:
             broken = bytearray(whole)
             broken[at + 2] ^= bit
             path.write_bytes(broken)
-            assert find_damage(path), f"{letter} {bit}"
+            assert is_damaged(path), f"{letter} {bit}"
             with pytest.raises(FILE_ERRORS) as caught:
                 open_writer(path)
             assert is_damage_error(caught.value)

@@ -37,7 +37,7 @@ def test_the_file_shrinks_and_its_content_stays(path: Path) -> None:
     assert is_whole(path)
     assert small(path) == (after, after)
     # It can be written as before, with consecutive numbers.
-    assert append(path, [scan("new")]) == (1, 0)
+    assert append(path, [scan("new")]) == 1
 
 
 def test_it_is_refused_while_the_file_is_read(path: Path) -> None:

@@ -18,7 +18,7 @@ from lupin_twin.core.state import Write
 from lupin_twin.journal.paths import Syncing
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Turn
-from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.salvage import salvage
 from lupin_twin.journal.schema import DamagedFile, open_writer
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import (
@@ -67,7 +67,7 @@ def test_a_write_is_stored_and_known_after_a_restart(tmp_path: Path) -> None:
         assert restored.last_seq == 1001
         assert journal.take_restored() is None
         journal.write(scan("5"))
-        wait_for(lambda: journal.condition.repeated == 1, "a row that is there already")
+    assert scans_in(path) == 1000, "the last one was there already"
 
 
 def test_before_the_clock_starts_nothing_is_written_and_nothing_lost(path: Path) -> None:
@@ -134,7 +134,7 @@ DAMAGED, FULL = DamagedFile("as SQLite finds it"), OSError("the disk is full")
     [
         ({APPEND: FULL}, False),
         ({APPEND: DAMAGED}, True),
-        ({APPEND: DAMAGED, "file.salvage": FULL}, True),
+        ({APPEND: DAMAGED, "writer.salvage": FULL}, True),
         ({APPEND: DAMAGED, "salvage.open_writer": FULL}, True),
     ],
 )
@@ -260,13 +260,6 @@ def test_age_and_size_limits_are_applied(path: Path, monkeypatch: pytest.MonkeyP
         assert journal.condition.state is JournalState.RECORDING
 
 
-def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
-    too_late = scan(at_ns=2**63)
-    no_number = replace(scan("8"), readings={"t": "x"})  # type: ignore[dict-item]
-    assert append(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
-    assert known(path) == {scan("1"), scan("2")}
-
-
 def test_a_reading_with_all_digits_takes_at_most_60_bytes(path: Path) -> None:
     chance = Random(1)
     rows = [
@@ -288,7 +281,7 @@ def test_runs_are_written_to_a_replaced_file(path: Path) -> None:
     with opened(path) as file:
         file.retain_run(run, end)
         file.retain_run(run, end)
-        assert file.append([(run, scan())]) == (1, 0)
+        assert file.append([(run, scan())]) == 1
     assert known(path) == {scan()}
 
 
@@ -321,28 +314,10 @@ def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
     assert select(path, "SELECT count(*) FROM scan") == [(0,)]
 
 
-@pytest.mark.parametrize("is_there", [True, False])
-def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
-    append(path, [scan(at_ns=NOW + n) for n in range(300)])
-    aside = quarantine(path)
-    if not is_there:  # the file was removed
-        aside.unlink()
-    with opened(path):
-        pass
-    assert select(path, "SELECT count(*) FROM scan") == [(300 if is_there else 0,)]
-    assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
-
-
-@pytest.mark.parametrize("renamed", [0, 1, 2])
-def test_a_quarantine_that_was_killed_is_completed(
+@pytest.mark.parametrize("renamed", [0, 1])
+def test_a_salvage_that_was_killed_loses_nothing(
     path: Path, monkeypatch: pytest.MonkeyPatch, renamed: int
 ) -> None:
-    left = path.with_name("left.sqlite")
-    with opened(path) as file:
-        run = file.start(CLOCK, is_believed=False).run
-        file.append([(run, scan(at_ns=NOW + n)) for n in range(300)])
-        for end in ("", "-wal"):  # as a killed twin leaves them
-            shutil.copy(f"{path}{end}", f"{left}{end}")
     rename, done = Path.rename, count()
 
     def killed(old: Path, new: Path) -> None:
@@ -350,14 +325,17 @@ def test_a_quarantine_that_was_killed_is_completed(
             raise KeyboardInterrupt
         rename(old, new)
 
+    append(path, [scan(at_ns=NOW + n) for n in range(300)])
     with monkeypatch.context() as killing:
         killing.setattr(Path, "rename", killed)
         with pytest.raises(KeyboardInterrupt):
-            quarantine(left)
-    with opened(left) as file:
-        assert Path(file.quarantined).name.startswith("left.sqlite.damaged-")
-    assert select(left, "SELECT count(*) FROM scan") == [(300,)]
-    assert not left.with_name("left.sqlite.new").exists()
+            salvage(path)
+    assert path.exists() is not bool(renamed)
+    with recording(path) as journal:
+        assert journal.take_restored(30.0) is not None
+    salvage(path)
+    assert select(path, "SELECT count(*) FROM scan WHERE is_copy = 0") == [(300,)]
+    assert not path.with_name("j.sqlite.new").exists()
 
 
 def test_a_failed_sync_is_reported_with_the_next_write(

@@ -148,7 +148,7 @@ def test_a_restarted_twin_has_the_state_from_before_and_repeated_messages_change
             life.memory.apply(write, NOW + 9 * S)
         assert life.live == restored
         assert life.store.observation_count == again
-        wait_for(lambda: life.memory.condition.repeated == 5, "all that were there")
+        wait_for(lambda: not life.memory.condition.waiting, "all that were there")
         assert life.memory.condition.written == 0
 
 

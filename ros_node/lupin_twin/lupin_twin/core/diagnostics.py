@@ -83,8 +83,7 @@ class Condition:
     """The journal's state, a sentence about it, and counts since the twin started.
 
     `waiting` rows are queued but not written yet, the oldest of them for `behind_s`. `lost` rows
-    were discarded because too many were waiting. `refused` rows were invalid themselves, and
-    `repeated` rows were already stored. `quarantined` names the last quarantined file.
+    were discarded because too many were waiting. `quarantined` names the last quarantined file.
     `simulated_ns` is the period of ROS time, start and end, that a simulation filled in and no
     robot observed; None if there is none.
 
@@ -98,11 +97,9 @@ class Condition:
     detail: str = ""
     path: str = ""
     written: int = 0
-    repeated: int = 0
     waiting: int = 0
     behind_s: float = 0.0
     lost: int = 0
-    refused: int = 0
     file_bytes: int = 0
     quarantined: str = ""
     simulated_ns: tuple[int, int] | None = None
@@ -208,7 +205,6 @@ def findings(health: Health) -> Iterator[Finding]:
             "written": str(journal.written),
             "waiting": str(journal.waiting),
             "lost": str(journal.lost),
-            "refused": str(journal.refused),
             "set aside": journal.quarantined,
             # Start and end of the simulated past. This and the next two are ns of ROS time.
             "simulated": _stretches((journal.simulated_ns,) if journal.simulated_ns else ()),
@@ -308,7 +304,6 @@ def _journal(finding: Finding) -> Condition:
         written=_number(values, "written"),
         waiting=_number(values, "waiting"),
         lost=_number(values, "lost"),
-        refused=_number(values, "refused"),
         quarantined=shown(values.get("set aside", "")),
         simulated_ns=simulated[0] if len(simulated) == 1 else None,
         complete_ns=complete[0] if len(complete) == 1 else None,

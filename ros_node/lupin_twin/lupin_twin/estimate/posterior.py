@@ -37,8 +37,6 @@ _STEP: Final = 0.1
 _COARSEST_STEP: Final = 0.2
 # Places above which a lattice is made coarser, up to `_COARSEST_STEP`.
 _CHEAP: Final = 4_096
-# Cells along an axis that are interpolated at a time.
-_CELLS_AT_ONCE: Final = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,12 +74,8 @@ def _spread(
     if places is cells:
         return values.reshape(len(cells[1]), -1)
     values = values.reshape(len(places[1]), -1)
-    down = np.empty((len(cells[1]), values.shape[1]))
-    for some, near, shares in _shares(cells[1], places[1]):
-        np.matmul(shares, values[near], out=down[some])
-    result = np.empty((len(cells[1]), len(cells[0])))
-    for some, near, shares in _shares(cells[0], places[0]):
-        result[:, some] = down[:, near] @ shares.T
+    x, y = (_shares(*axis) for axis in zip(cells, places, strict=True))
+    result: FloatArray = y @ values @ x.T
     np.maximum(result, values.min(), out=result)
     return result
 
@@ -93,27 +87,18 @@ def _places(cells: FloatArray, step: float) -> FloatArray:
     return result
 
 
-def _shares(cells: FloatArray, places: FloatArray) -> list[tuple[slice, slice, FloatArray]]:
-    """For parts of an axis: the cells, the places around them, and the interpolation weights."""
+def _shares(cells: FloatArray, places: FloatArray) -> FloatArray:
+    """Along an axis, the interpolation weight that each place has at each cell."""
     position = (cells - places[0]) / (places[1] - places[0])
     # The first cell lies on a place or, because of rounding, slightly before it.
     before = np.clip(position.astype(np.int64), 1, len(places) - 3)
     t = position - before
-    shares = (
-        -0.5 * t**3 + t**2 - 0.5 * t,
-        1.5 * t**3 - 2.5 * t**2 + 1.0,
-        -1.5 * t**3 + 2.0 * t**2 + 0.5 * t,
-        0.5 * t**3 - 0.5 * t**2,
-    )
-    result = []
-    for first in range(0, len(cells), _CELLS_AT_ONCE):
-        some = slice(first, min(first + _CELLS_AT_ONCE, len(cells)))
-        lowest = int(before[first]) - 1
-        part = np.zeros((some.stop - first, int(before[some.stop - 1]) + 3 - lowest))
-        rows = np.arange(len(part))
-        for offset, share in enumerate(shares):
-            part[rows, before[some] - 1 - lowest + offset] += share[some]
-        result.append((some, slice(lowest, lowest + part.shape[1]), part))
+    result = np.zeros((len(cells), len(places)))
+    rows = np.arange(len(cells))
+    result[rows, before - 1] = -0.5 * t**3 + t**2 - 0.5 * t
+    result[rows, before] = 1.5 * t**3 - 2.5 * t**2 + 1.0
+    result[rows, before + 1] = -1.5 * t**3 + 2.0 * t**2 + 0.5 * t
+    result[rows, before + 2] = 0.5 * t**3 - 0.5 * t**2
     return result
 
 

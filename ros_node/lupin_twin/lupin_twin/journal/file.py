@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import sqlite3
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
@@ -15,8 +14,9 @@ from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Write
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.appending import Appender, copy_known, simulated
-from lupin_twin.journal.checking import find_damage, size_of
+from lupin_twin.journal.checking import size_of
 from lupin_twin.journal.fold import Restored, copies, fold
 from lupin_twin.journal.paths import Syncing, files_of, forwarded_seq
 from lupin_twin.journal.retention import (
@@ -31,7 +31,6 @@ from lupin_twin.journal.retention import (
 )
 from lupin_twin.journal.rows import LATCHED, last_rows
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
-from lupin_twin.journal.salvage import SALVAGE, begun_quarantine, quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     MAP,
@@ -44,8 +43,6 @@ from lupin_twin.journal.schema import (
 )
 from lupin_twin.journal.writes import number_of, put_note
 
-# A file up to this size is checked for damage when it is opened: a quarter of a second.
-_CHECKED_BYTES: Final = 64_000_000
 # The WAL is checkpointed at this size: the larger it is, the fewer pages are written twice.
 LOG_BYTES: Final = 8_000_000
 PURGE_EVERY_S: Final = 60.0
@@ -53,60 +50,26 @@ _POLL_EVERY_S: Final = 1.0
 # Least time between two maps that are written: a robot that explores sends one every second.
 _MAP_REST_S: Final = 10.0
 
-# Errors that are caused by a single row, which is then refused.
-_ROW_ERRORS: Final = (
-    ValueError,
-    OverflowError,
-    TypeError,
-    sqlite3.DataError,
-    sqlite3.IntegrityError,
-    sqlite3.InterfaceError,
-)
-
 
 class JournalFile:
     """A journal's file, open for writing from construction to `close`.
-
-    A damaged file is first quarantined, then salvaged into a new one; `quarantined` is its new
-    path. Unless it `is_sound`, the file is checked when it is opened, if it is not too large.
 
     Raises:
         Foreign, sqlite3.Error, OSError: as `open_writer`.
 
     """
 
-    def __init__(self, path: Path, limits: Limits, *, is_sound: bool) -> None:
-        self.simulated: tuple[int, int] | None = None
+    def __init__(self, path: Path, limits: Limits) -> None:
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
         # Says that the write-ahead log (WAL) was removed, so readers may fail; empty: it was not.
         self.lost_log = ""
         self._path, self._log = path, path.with_name(path.name + "-wal")
         self._limits = limits
-        self._map: object = None
+        self._map: OccupancyMap | None = None
         self._map_rests_until_s = 0.0
-        self.quarantined = ""
-        if begun_quarantine(path) or (not is_sound and self._is_damaged()):
-            quarantine(path)
-        self._open()
-
-    def close(self) -> None:
-        """Move what was committed from the WAL into the file, and close it."""
-        self._syncing.close()
-        try:
-            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
-        finally:
-            self._connection.close()
-
-    # --- opening ------------------------------------------------------------------------------
-
-    def _is_damaged(self) -> bool:
-        return 0 < size_of(self._path) <= _CHECKED_BYTES and find_damage(self._path) is not None
-
-    def _open(self) -> None:
         self._connection = open_writer(self._path)
         try:
-            self._salvage()
             self._appender = Appender(self._connection)
             self.simulated = simulated(self._connection)
             self.journal_id = get_meta(self._connection, "journal_id") or ""
@@ -121,34 +84,26 @@ class JournalFile:
             raise
         self.inode, self._log_inode = files_of(self._path)
 
-    def _salvage(self) -> None:
-        """Copy what is readable of a file that was quarantined now, or before the last stop."""
-        name = get_meta(self._connection, SALVAGE)
-        if not name:
-            return
-        quarantined = self._path.with_name(name)
-        self.quarantined = str(quarantined)
-        salvage(quarantined, self._connection)
-        with transaction(self._connection):
-            # It is unknown what could not be read, so each run counts as incomplete up to now. A
-            # simulation's time may have stood still since its last row.
-            for run in self._runs():
-                now_ns = 0 if run.begun.is_simulated else time.time_ns()
-                note_lost(self._connection, run.root, max(now_ns, self._last(run).stamp_ns))
-            self._connection.execute("DELETE FROM meta WHERE key = ?", (SALVAGE,))
+    def close(self) -> None:
+        """Move what was committed from the WAL into the file, and close it."""
+        self._syncing.close()
+        try:
+            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+        finally:
+            self._connection.close()
 
     def note_world(self, world: World) -> None:
         """Write which world is observed from now on."""
         set_meta(self._connection, ORIGIN, world.origin)
         set_meta(self._connection, DAY_LENGTH, world.day_length_s)
 
-    def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
+    def put_map(self, floor: OccupancyMap) -> None:
         """Write the latest map, with this call or a later one; an empty text: it is too large."""
         now_s = time.monotonic()
         if floor is self._map or now_s < self._map_rests_until_s:
             return
         self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
-        text = text_of()
+        text = text_of(floor)
         if (get_meta(self._connection, MAP) or "") != text:
             set_meta(self._connection, MAP, text)
 
@@ -267,27 +222,13 @@ class JournalFile:
 
     # --- writing ------------------------------------------------------------------------------
 
-    def append(self, rows: Sequence[tuple[Run, Write]]) -> tuple[int, int]:
-        """Write rows in one transaction; returns how many were new, and how many were refused.
+    def append(self, rows: Sequence[tuple[Run, Write]]) -> int:
+        """Write rows in one transaction; returns how many were new.
 
         Raises:
             sqlite3.Error, OSError: nothing was written.
 
         """
-        if not rows:
-            return 0, 0
-        try:
-            return self._append(rows), 0
-        except _ROW_ERRORS:
-            written = refused = 0
-        for entry in rows:
-            try:
-                written += self._append([entry])
-            except _ROW_ERRORS:
-                refused += 1
-        return written, refused
-
-    def _append(self, rows: Sequence[tuple[Run, Write]]) -> int:
         with self._transaction():
             written = 0
             for root, of_run in groupby(rows, lambda entry: entry[0].root):

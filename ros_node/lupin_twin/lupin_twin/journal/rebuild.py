@@ -9,7 +9,6 @@ file stays beside the new one; one of version 4, as `NAME.v4`.
 from __future__ import annotations
 
 import errno
-import os
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -25,7 +24,7 @@ from lupin_twin.journal.counts import ADD_HOUR, DELETED
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.paths import writing_alone
 from lupin_twin.journal.runs import Run, put_run, runs
-from lupin_twin.journal.salvage import delete, numbered
+from lupin_twin.journal.salvage import delete, replace_journal
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
     FILE_ERRORS,
@@ -42,7 +41,6 @@ from lupin_twin.journal.schema import (
     json_text,
     open_writer,
     set_meta,
-    sync,
     transaction,
 )
 from lupin_twin.journal.version3 import VERSION, OldRun, Version3
@@ -105,18 +103,12 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
                     target.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
                     report(min(1.0, share))
                 damaged = _copied(target)[1]
-        sync(new)
-        kept = _keep(path, version)
+        kept = replace_journal(path, new, f".v{version}")
     except BaseException as error:
         delete(new)
         if isinstance(error, sqlite3.OperationalError) and str(error).startswith("no such"):
             raise DamagedFile(f"the tables of {path} are not those of a journal") from error
         raise
-    # Empty by now, but they belong to the old file. A process that still reads it has them open.
-    delete(path, "-wal", "-shm")
-    new.chmod(path.stat().st_mode & 0o777)
-    new.replace(path)
-    sync(path.parent)
     return f"{damaged:,} rows of {kept} are damaged and left out" if damaged else ""
 
 
@@ -145,28 +137,6 @@ def _begun(path: Path, new: Path) -> sqlite3.Connection:
 def _copied(target: sqlite3.Connection) -> tuple[int, int]:
     after, _, damaged = (get_meta(target, _COPIED) or "0 0").partition(" ")
     return int(after), int(damaged)
-
-
-def _keep(path: Path, version: int | None) -> Path:
-    """Give the old file a second name, and return that; no other file is overwritten."""
-    for kept in numbered(path, f".v{version}"):
-        if not kept.exists():
-            break
-        if kept.samefile(path):  # an earlier upgrade was killed after this step
-            return kept
-    try:
-        os.link(path, kept)
-    except OSError:  # a file system without links
-        part = path.with_name(path.name + ".upgrade-copy")
-        try:
-            shutil.copyfile(path, part)
-            sync(part)
-        except OSError:  # the disk is full: a partial copy would keep it so
-            part.unlink(missing_ok=True)
-            raise
-        part.rename(kept)
-    sync(path.parent)
-    return kept
 
 
 def _copy_version4(old: Path, new: Path, target: sqlite3.Connection) -> Iterator[float]:

@@ -24,7 +24,6 @@ from lupin_twin.journal.schema import (
     WRITTEN,
     NotPossible,
     SiteLog,
-    get_meta,
     set_meta,
     transaction,
 )
@@ -234,8 +233,6 @@ def records(connection: sqlite3.Connection) -> Iterator[Mapping[str, object]]:
 
 
 def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> None:
-    if get_meta(connection, "salvage"):
-        raise NotPossible(f"the journal {path} is being saved from damage: start its twin once")
     query = {"site": LOCAL_SITE, "tag": tag_id}
     for table in ("series", "place"):
         found = connection.execute(f"SELECT 1 FROM {table} WHERE {_OF_TAG} LIMIT 1", query)  # noqa: S608

@@ -1,8 +1,9 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""Quarantines a damaged journal under a dated name, and copies what can be read into a new one.
+"""Replaces a damaged journal by a new one with what can be read of it.
 
-SQLite itself reads the file, on both sides of each damaged page. With such a page, the copy loses
-its rows, and those of the pages that are reachable only through it.
+SQLite itself reads the file, on both sides of each damaged page. With such a page, the new file
+loses its rows, and those of the pages that are reachable only through it. Counts of lost rows stay,
+as those of deleted rows do.
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ from types import NoneType
 from typing import Any, Final
 from urllib.parse import quote
 
-from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
-from lupin_twin.journal.checking import delete_wrong
-from lupin_twin.journal.counts import DELETED, count_rows
+from lupin_twin.journal.checking import delete_wrong, size_of
+from lupin_twin.journal.counts import extent
+from lupin_twin.journal.retention import note_lost
 from lupin_twin.journal.rows import is_number
+from lupin_twin.journal.runs import runs
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     HOURS_OF_LISTS,
@@ -31,20 +33,16 @@ from lupin_twin.journal.schema import (
     PAGE_SIZE,
     TABLES,
     WRITTEN,
-    Foreign,
     SiteLog,
     empty_file,
-    get_meta,
     insert_into,
     is_damage_error,
-    open_reader,
     open_writer,
     set_meta,
+    sync,
     transaction,
 )
 
-# Key of the quarantined file's name, until it has been salvaged.
-SALVAGE: Final = "salvage"
 # Rows that are read at once; around damage, fewer.
 _LOT: Final = 1_000
 _LAST: Final = 2**61
@@ -61,80 +59,74 @@ _SERIES_OF: Final = (
     "SELECT site, series, run, tag, kind, sensors FROM series INDEXED BY series_of"
     " WHERE site = 'local'"
 )
-# Small tables, and the column by which each is ordered.
-_SMALL: Final = {"run": "run", "series": "series", "place": "seq", "note": "id"}
+# Tables that are copied at once, and the column by which each is ordered.
+_ORDERS: Final = {
+    **dict.fromkeys(("run", "tally", "event"), "run"),
+    **dict.fromkeys(("series", "hour"), "series"),
+    "place": "seq",
+    "note": "id",
+}
 _NO_RUN: Final = "run NOT IN (SELECT run FROM run)"
 _MEANINGLESS: Final = {
     "run": "joins NOT IN (SELECT run FROM run)",
     "series": f"{_NO_RUN} OR NOT json_valid(sensors)",
-    "place": _NO_RUN,
-}
-# Counts of deleted rows are copied; rows that exist are counted again.
-_COUNTED: Final = {
-    "hour": ("series", f"hour <= :at / {HOUR_NS}"),
-    "tally": ("run", f"hour <= :at / {HOUR_NS}"),
-    "event": ("run", "stamp_ns <= :at"),
+    "hour": "series NOT IN (SELECT series FROM series)",
+    **dict.fromkeys(("place", "tally", "event"), _NO_RUN),
 }
 _HAS_SENSOR: Final = "SELECT 1 FROM pragma_table_info('hour') WHERE name = 'sensor'"
-_NOT_DELETED: Final = (
-    (
-        "DELETE FROM hour WHERE series IN (SELECT series FROM series WHERE run = :run)"
-        f" AND hour > :at / {HOUR_NS}"
-    ),
-    f"DELETE FROM tally WHERE run = :run AND hour > :at / {HOUR_NS}",
-    "DELETE FROM event WHERE run = :run AND stamp_ns > :at",
-)
 
 Record = tuple[Any, ...]
 
 
-def numbered(path: Path, end: str) -> Iterator[Path]:
-    """Yield names of files beside `path`, to find one that is not taken."""
-    for number in count():
-        yield path.with_name(f"{path.name}{end}" + (f"-{number}" if number else ""))
+def replace_journal(path: Path, new: Path, end: str) -> Path:
+    """Put a new file in a journal's place; the old one and its WAL get another name with this end.
 
-
-def quarantine(path: Path) -> Path:
-    """Rename a file and its WAL; returns the new path. No data is deleted or overwritten.
-
-    In its place comes a new file which names it, so that a salvage that fails is done again. If
-    this is killed, the next call completes it (`begun_quarantine`).
+    Returns that name. No data is deleted or overwritten. If this is killed, the old file is still
+    in its place, or `finish_replacing` puts the new one there.
     """
-    new, name = _new_of(path), begun_quarantine(path)
-    if not name:
-        delete(new)
-        # Wall time, for the person who looks for the file.
-        when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-        free = (file for file in numbered(path, f".damaged-{when}") if not file.exists())
-        name = next(free).name
-        with closing(open_writer(new)) as connection:
-            set_meta(connection, SALVAGE, name)
-    quarantined = path.with_name(name)
-    # The WAL first: SQLite would read it as that of the new file.
-    for end in ("-wal", ""):
-        old, its = path.with_name(path.name + end), quarantined.with_name(name + end)
-        if old.exists() and not its.exists():
-            old.rename(its)
-    # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file. So
-    # would be an empty WAL, which a reader makes if it finds none.
-    delete(path, "-wal", "-shm")
-    new.rename(path)
-    return quarantined
+    sync(new)
+    new.chmod(path.stat().st_mode & 0o777)
+    for number in count():
+        old = path.with_name(path.name + end + (f"-{number}" if number else ""))
+        if not old.exists() or old.samefile(path):  # killed after this step
+            break
+    for part in ("", "-wal"):
+        one, other = path.with_name(path.name + part), old.with_name(old.name + part)
+        if size_of(one) and not other.exists():
+            _give_name(one, other)
+    sync(path.parent)
+    new.rename(_ready(path))
+    path.unlink()
+    finish_replacing(path)
+    return old
 
 
-def begun_quarantine(path: Path) -> str:
-    """The new name of a file whose quarantine was killed; empty: none was."""
-    try:
-        with closing(open_reader(_new_of(path))) as connection:
-            name = get_meta(connection, SALVAGE) or ""
-    except (*FILE_ERRORS, Foreign, OSError):
-        return ""
-    # If both exist, another journal has been begun since then.
-    return "" if path.exists() and path.with_name(name).exists() else name
+def finish_replacing(path: Path) -> None:
+    """Put a new file in the place of a journal that is gone, if there is one."""
+    if _ready(path).exists() and not path.exists():
+        # SQLite would take them for those of the new file. Who reads the old one has them open, and
+        # nobody opens them meanwhile: there is no journal.
+        delete(path, "-wal", "-shm")
+        _ready(path).rename(path)
+        sync(path.parent)
 
 
-def _new_of(path: Path) -> Path:
+def _ready(path: Path) -> Path:
     return path.with_name(path.name + ".new")
+
+
+def _give_name(path: Path, other: Path) -> None:
+    try:
+        os.link(path, other)
+    except OSError:  # a file system without links
+        part = path.with_name(path.name + ".copy")
+        try:
+            shutil.copyfile(path, part)
+            sync(part)
+        except OSError:  # the disk is full: a partial copy would keep it so
+            part.unlink(missing_ok=True)
+            raise
+        part.rename(other)
 
 
 def delete(path: Path, *ends: str) -> None:
@@ -200,30 +192,39 @@ def _behind_damage(lot: Callable[[int, int], object], bad: int) -> int:
     return good
 
 
-def salvage(quarantined: Path, connection: sqlite3.Connection) -> None:
-    """Copy what can be read of a quarantined journal into a new one; rows keep their numbers.
+def salvage(path: Path) -> Path:
+    """Quarantine a damaged journal, with a new one in its place; rows keep their numbers.
 
-    After a salvage that was killed, everything is copied again. If the quarantined file is gone,
-    nothing is copied.
+    Returns the damaged file's new name, which tells the time. It is unknown what could not be read,
+    so each run counts as incomplete up to now.
 
     Raises:
-        sqlite3.Error, OSError: the new one cannot be written, or the old one cannot be opened.
+        sqlite3.Error, OSError: the damaged file is still in its place: the disk is full, say.
 
     """
-    if not quarantined.exists():
-        return
-    mended = quarantined.with_name(quarantined.name + ".mended")
+    new, mended = (path.with_name(path.name + end) for end in (".salvage", ".mended"))
+    delete(new)
     try:
-        with closing(_opened(quarantined)) as old:
-            is_known = _has_tables(old)
-            if is_known:
-                _copy(old, connection, quarantined.stat().st_size)
-        if not is_known:
-            _mend(quarantined, mended)
-            with closing(_opened(mended)) as old:
-                _copy(old, connection, quarantined.stat().st_size)
+        with closing(open_writer(new)) as target:
+            with closing(_opened(path)) as old:
+                is_known = _has_tables(old)
+                if is_known:
+                    _copy(old, target, path.stat().st_size)
+            if not is_known:
+                _mend(path, mended)
+                with closing(_opened(mended)) as old:
+                    _copy(old, target, path.stat().st_size)
+            log = SiteLog(target)
+            for run in runs(log.execute):
+                # A simulation's time may have stood still since its last row.
+                now_ns = 0 if run.begun.is_simulated else time.time_ns()
+                last_ns = max(now_ns, run.begun.stamp_ns, *(extent(log, run.root) or ()))
+                note_lost(target, run.root, last_ns)
+        # Wall time, for the person who looks for the file.
+        when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+        return replace_journal(path, new, f".damaged-{when}")
     finally:
-        delete(quarantined, "-shm")
+        delete(new)
         delete(mended)
 
 
@@ -247,13 +248,11 @@ def _has_tables(old: sqlite3.Connection) -> bool:
     return True
 
 
-def _mend(quarantined: Path, mended: Path) -> None:
+def _mend(damaged: Path, mended: Path) -> None:
     """Copy a file with a new one's header and schema, which lie at the same place in each."""
     for end in ("", "-wal"):
-        if quarantined.with_name(quarantined.name + end).exists():
-            shutil.copyfile(
-                quarantined.with_name(quarantined.name + end), mended.with_name(mended.name + end)
-            )
+        if (part := damaged.with_name(damaged.name + end)).exists():
+            shutil.copyfile(part, mended.with_name(mended.name + end))
     content, roots = empty_file()
     with mended.open("rb+") as file:
         for number in range(len(content) // PAGE_SIZE):
@@ -267,20 +266,16 @@ def _mend(quarantined: Path, mended: Path) -> None:
 
 def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
     with transaction(new):
-        for table in TABLES:
-            new.execute(f"DELETE FROM {table}")
-        purged = _copy_facts(old, new, size)
-        for table, by in _SMALL.items():
-            _put(new, table, _both_ends(old, _ALL.format(table), by))
+        _copy_facts(old, new, size)
+        for table, by in _ORDERS.items():
+            select = _ALL.format(table)
+            if table == "hour" and not old.execute(_HAS_SENSOR).fetchone():  # of version 4
+                of_lists = HOURS_OF_LISTS.format(lists=table, each="json_each(n) AS each")
+                select = f"{of_lists} AND site = 'local'"
+            _put(new, table, _both_ends(old, select, by))
         _put(new, "series", _both_ends(old, _SERIES_OF, "run"))
-        if purged:
-            _copy_counts(old, new, max(purged.values()))
         for table, is_meaningless in _MEANINGLESS.items():
             new.execute(f"DELETE FROM {table} WHERE {is_meaningless}")
-        for (run,) in new.execute("SELECT run FROM run").fetchall():
-            within = {"run": run, "at": purged.get(run, -1)}
-            for of_run in _NOT_DELETED:
-                new.execute(of_run, within)
     for table in WRITTEN:
         select, behind = f"SELECT seq, * FROM {table} WHERE site = 'local' AND", -1
         for lot in filter(None, readable(old, select, "seq")):
@@ -288,29 +283,16 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
             with transaction(new):
                 _put(new, table, (row[1:] for row in lot))
                 delete_wrong(new, table, behind, last)
-                count_rows(SiteLog(new), behind, last, purged)
             behind = last
             # Move each lot into the file, so that the WAL does not grow.
             new.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
 
-def _copy_counts(old: sqlite3.Connection, new: sqlite3.Connection, at_ns: int) -> None:
-    """Copy the counts up to a stamp."""
-    for table, (by, which) in _COUNTED.items():
-        select = _ALL.format(table)
-        if table == "hour" and not old.execute(_HAS_SENSOR).fetchone():  # of version 4
-            of_lists = HOURS_OF_LISTS.format(lists=table, each="json_each(n) AS each")
-            select = f"{of_lists} AND site = 'local'"
-        _put(new, table, _both_ends(old, f"{select} AND {which}", by, {"at": at_ns}))
-
-
-def _both_ends(
-    old: sqlite3.Connection, select: str, by: str, values: Mapping[str, Any] | None = None
-) -> Iterator[Record]:
+def _both_ends(old: sqlite3.Connection, select: str, by: str) -> Iterator[Record]:
     """Yield rows from the first one up to damage, then from the last one back to damage."""
     for order in ("ASC", "DESC"):
         try:
-            yield from old.execute(f"{select} ORDER BY {by} {order}", values or {})
+            yield from old.execute(f"{select} ORDER BY {by} {order}")
         except FILE_ERRORS as error:
             if not _is_unreadable(error):
                 raise
@@ -318,23 +300,18 @@ def _both_ends(
             return
 
 
-def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> dict[int, int]:
-    """Copy facts about the journal as a whole; returns the last deleted stamp of each run."""
-    purged, largest = {}, size // _LEAST_ROW_BYTES
+def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
+    """Copy facts about the journal as a whole."""
+    largest = size // _LEAST_ROW_BYTES
     for _, key, value in _both_ends(old, _ALL.format("meta"), "key"):
-        run = str(key).removeprefix(DELETED)
         is_sound = is_number(str(value))
         if key in (LAST_SEQ, PURGED_SEQ) and is_sound:
             largest = max(largest, int(value))
-        if run != key and is_number(run) and is_sound:
-            # The whole hour is counted already.
-            purged[int(run)] = (int(value) // HOUR_NS + 1) * HOUR_NS - 1
         is_sound |= key != PURGED_SEQ and "_ns" not in str(key)
-        if is_sound and key not in ("journal_id", SALVAGE, LAST_SEQ):
+        if is_sound and key not in ("journal_id", LAST_SEQ):
             set_meta(new, key, value)
     # New numbers are past those of all rows that may have been lost at the end.
     set_meta(new, LAST_SEQ, largest + 1_000_000)
-    return purged
 
 
 def _put(new: sqlite3.Connection, table: str, rows: Iterable[Record]) -> None:
@@ -343,5 +320,5 @@ def _put(new: sqlite3.Connection, table: str, rows: Iterable[Record]) -> None:
         _TYPES[kind] if is_needed else (*_TYPES[kind], NoneType)
         for _, _, kind, is_needed, *_ in new.execute(f"PRAGMA table_info({table})").fetchall()
     ]
-    fitting = [row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, types))]
+    fitting = (row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, types)))
     new.executemany(f"{insert_into(table)} ON CONFLICT DO NOTHING", fitting)

@@ -13,7 +13,6 @@ import time
 from collections import deque
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -22,7 +21,8 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
-from lupin_twin.field.explored import OccupancyMap, text_of
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.checking import is_damaged
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.paths import InUse, Lock
@@ -30,7 +30,7 @@ from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
-from lupin_twin.journal.salvage import quarantine
+from lupin_twin.journal.salvage import finish_replacing, salvage
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 from lupin_twin.journal.writes import NoteQueue
 
@@ -298,16 +298,9 @@ class Journal:
         self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self._lock is None:
             self._lock = Lock(self._path, self._holder)
-        # A damaged one is quarantined, whatever its version.
-        if self._is_sound is False:
-            quarantine(self._path)
-            self._is_sound = None  # if its salvage fails, only that is done again
-        elif old_version(self._path) is not None:
-            self._left_out = upgrade(self._path, self._report_progress)
-        file = JournalFile(self._path, self._limits, is_sound=bool(self._is_sound))
+        self._mend()
+        file = JournalFile(self._path, self._limits)
         try:
-            self._is_sound = True
-            self._quarantined = file.quarantined or self._quarantined
             file.note_world(self._world)
             if self._file is not None:
                 for run in self._runs:
@@ -321,7 +314,7 @@ class Journal:
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
                 if self._map is not None:
-                    file.put_map(self._map, partial(text_of, self._map))
+                    file.put_map(self._map)
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
                 self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
@@ -331,6 +324,17 @@ class Journal:
                     self._stop.wait(self._gather_s())
         finally:
             file.close()
+
+    def _mend(self) -> None:
+        """Upgrade a file of an earlier version, and salvage a damaged one, whatever its version."""
+        finish_replacing(self._path)
+        if self._is_sound is None:
+            if old_version(self._path) is not None:
+                self._left_out = upgrade(self._path, self._report_progress)
+            self._is_sound = not is_damaged(self._path)
+        if not self._is_sound and self._path.exists():
+            self._quarantined = str(salvage(self._path))
+        self._is_sound = True
 
     def _gather_s(self) -> float:
         *_, oldest_s = self._pending.counts()
@@ -378,17 +382,12 @@ class Journal:
                 return
             # Entries of an era without a run yet come after all others.
             known = [entry for entry in entries if entry.era <= len(self._runs)]
-            written, refused = file.append(
+            written = file.append(
                 [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]
             )
             self._pending.done(len(known))
             self._failures = 0
-            self._reported = replace(
-                self._reported,
-                written=self._reported.written + written,
-                refused=self._reported.refused + refused,
-                repeated=self._reported.repeated + len(known) - written - refused,
-            )
+            self._reported = replace(self._reported, written=self._reported.written + written)
             lost_ns = self._pending.take_lost()
             if lost_ns is not None:
                 file.note_lost(self._runs[-1], lost_ns)

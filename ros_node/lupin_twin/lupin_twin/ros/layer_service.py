@@ -88,7 +88,7 @@ class LayerService:
     def __init__(self, twin: Twin, services: Services, wake: Callable[[], None]) -> None:
         self._twin, self._services = twin, services
         self._topics: list[_Topic] = []
-        self.queue = JobQueue("layers", wake, large_threads=1, small_threads=0)
+        self.queue = JobQueue("layers", wake, large_threads=1)
 
     def offer(self) -> None:
         """Create the topics, with names relative to the node's namespace.

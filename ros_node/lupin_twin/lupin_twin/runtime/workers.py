@@ -1,12 +1,11 @@
 """Worker threads and job queues for longer work; small jobs never wait for large ones.
 
-A job is due at its arrival plus `PATIENCE` times its estimated cost, and the earliest due runs
-first. So an expensive job lets cheap ones pass, but only those that arrive within `PATIENCE` times
-its own cost: no job starves. One thread takes only small jobs (`SMALL_S`), so that they need not
-wait for a large one to end either.
+Small jobs (`SMALL_S`) have threads of their own. A job is due at its arrival plus `PATIENCE` times
+its estimated cost, and the earliest due runs first. So an expensive job lets cheap ones pass, but
+only those that arrive within `PATIENCE` times its own cost: no job starves.
 
-Work that nobody waits for ends. `Job.cancel` removes it from the queue or, if it runs already,
-turns its `should_stop` true, which long computations check between their steps.
+Work that nobody waits for ends. `Job.cancel` ends it before it begins or, if it runs already, turns
+its `should_stop` true, which long computations check between their steps.
 """
 
 from __future__ import annotations
@@ -18,6 +17,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from functools import partial
+from itertools import count
+from queue import PriorityQueue
 from typing import Any, Final, Generic, TypeVar
 
 from lupin_twin.core.past import NotRemembered
@@ -26,12 +27,9 @@ from lupin_twin.core.past import NotRemembered
 # send requests at their allowed rate do not keep the threads busy.
 SMALL_S: Final = 0.02
 PATIENCE: Final = 2.0
-# Threads that take any job; two, so that one heavy job does not hold up all other large ones.
+# For each kind of job, so that one heavy job does not hold up all others.
 LARGE_THREADS: Final = 2
-SMALL_THREADS: Final = 1
-
-# How often a thread asks again whether a job is admitted, s.
-_CHECK_S: Final = 0.05
+_SMALL_THREADS: Final = 2
 
 # Plain Python code keeps all other threads waiting; after this long, s, it pauses.
 TURN_S: Final = 0.002
@@ -42,20 +40,11 @@ ShouldStop = Callable[[], bool]
 
 
 class Job(Future[ResultT], Generic[ResultT]):
-    """The future of `work(should_stop)`, which is estimated to take `cost_s`."""
+    """The future of `work(should_stop)`."""
 
-    def __init__(
-        self,
-        work: Callable[[ShouldStop], ResultT],
-        cost_s: float,
-        arrived_s: float,
-        on_cancel: Callable[[Job[ResultT]], None],
-    ) -> None:
+    def __init__(self, work: Callable[[ShouldStop], ResultT]) -> None:
         super().__init__()
-        self.cost_s = cost_s
-        self.due_s = arrived_s + PATIENCE * cost_s
-        self._work = work
-        self._on_cancel = on_cancel
+        self._work: Callable[[ShouldStop], ResultT] | None = work
         self._is_abandoned = False
 
     def should_stop(self) -> bool:
@@ -63,31 +52,30 @@ class Job(Future[ResultT], Generic[ResultT]):
         return self._is_abandoned
 
     def cancel(self) -> bool:
-        """Abandon the job: remove it from the queue or, if it runs, let it end soon."""
-        if not self.done():
-            self._is_abandoned = True
-            self._on_cancel(self)
-        return super().cancel()
+        """Abandon the job: it never begins or, if it runs, ends soon."""
+        self._is_abandoned = True
+        if is_cancelled := super().cancel():
+            self._work = None
+        return is_cancelled
 
     def run(self) -> None:
         """Do the work, in a worker's thread."""
-        if not self.set_running_or_notify_cancel():
+        # The inputs must not live as long as the result.
+        work, self._work = self._work, None
+        if work is None or not self.set_running_or_notify_cancel():
             return
         try:
-            result = self._work(self.should_stop)
+            result = work(self.should_stop)
         except BaseException as error:  # noqa: BLE001  # handed to whoever waits
             self.set_exception(error)
         else:
             self.set_result(result)
-        # The inputs must not live as long as the result.
-        del self._work
 
 
 class Workers:
-    """A pool of threads, and the jobs that wait for one. Any thread may call it.
+    """Threads for large jobs, and others for small ones. Any thread may call it.
 
-    The threads start with the first job. `clock` tells seconds and never jumps. A job begins once
-    `admits(cost_s)`, which is asked in the order of the jobs, and again after a while.
+    The threads start with the first job. `clock` tells seconds and never jumps. `jobs` wait or run.
     """
 
     def __init__(
@@ -95,28 +83,19 @@ class Workers:
         name: str,
         clock: Callable[[], float] = time.monotonic,
         large_threads: int = LARGE_THREADS,
-        small_threads: int = SMALL_THREADS,
-        admits: Callable[[float], bool] = lambda _: True,
     ) -> None:
-        self._name = name
+        self.jobs: set[Job[Any]] = set()
         self._clock = clock
-        self._admits = admits
-        self._only_small = [False] * large_threads + [True] * small_threads
-        self._waiting: list[Job[object]] = []
-        self._running: set[Job[object]] = set()
-        self._changed = threading.Condition()
-        self._threads: list[threading.Thread] = []
+        self._numbers = count()  # of equal jobs, the first to arrive is the first to run
+        # Of small jobs, and of large ones; None ends a thread.
+        self._queues = tuple(PriorityQueue[tuple[float, int, Job[Any] | None]]() for _ in range(2))
+        self._lock = threading.Lock()
         self._is_closed = False
-
-    @property
-    def waiting(self) -> int:
-        """Jobs that no thread has taken yet."""
-        return len(self._waiting)
-
-    @property
-    def running(self) -> int:
-        """Jobs that a thread is running."""
-        return len(self._running)
+        self._threads = [
+            threading.Thread(target=self._run, args=(queue,), name=f"{name}_{number}", daemon=True)
+            for queue, threads in zip(self._queues, (_SMALL_THREADS, large_threads), strict=True)
+            for number in range(threads)
+        ]
 
     def submit(self, work: Callable[[ShouldStop], ResultT], cost_s: float = 0.0) -> Future[ResultT]:
         """Queue `work(should_stop)`; `cost_s` is an estimate, in seconds of one core.
@@ -125,62 +104,34 @@ class Workers:
             RuntimeError: the workers were closed.
 
         """
-        job: Job[ResultT] = Job(work, cost_s, self._clock(), self._forget)
-        with self._changed:
+        job = Job(work)
+        with self._lock:
             if self._is_closed:
                 raise RuntimeError("the workers were closed")
-            if not self._threads:
-                self._start()
-            self._waiting.append(job)  # type: ignore[arg-type]  # whatever its result
-            self._changed.notify_all()
+            for thread in self._threads:
+                if thread.ident is None:
+                    thread.start()
+            self.jobs.add(job)
+        job.add_done_callback(self.jobs.discard)
+        due_s = self._clock() + PATIENCE * cost_s
+        self._queues[cost_s > SMALL_S].put((due_s, next(self._numbers), job))
         return job
-
-    def look_again(self) -> None:
-        """Begin what `admits` allows by now, without delay."""
-        with self._changed:
-            self._changed.notify_all()
 
     def close(self) -> None:
         """Drop waiting jobs, and ask running ones to stop. Does not wait for them."""
-        with self._changed:
+        with self._lock:
             self._is_closed = True
-            left = [*self._waiting, *self._running]
-            self._changed.notify_all()
-        for job in left:
+        for queue in self._queues:
+            for _ in self._threads:
+                queue.put((-math.inf, next(self._numbers), None))
+        for job in tuple(self.jobs):
             job.cancel()
 
-    def _forget(self, job: Job[ResultT]) -> None:
-        with self._changed:
-            if job in self._waiting:
-                self._waiting.remove(job)  # type: ignore[arg-type]
-
-    def _start(self) -> None:
-        for number, only_small in enumerate(self._only_small):
-            thread = threading.Thread(
-                target=self._run, args=(only_small,), name=f"{self._name}_{number}", daemon=True
-            )
-            self._threads.append(thread)
-            thread.start()
-
-    def _run(self, only_small: bool) -> None:
-        while (job := self._take(only_small)) is not None:
+    @staticmethod
+    def _run(queue: PriorityQueue[tuple[float, int, Job[Any] | None]]) -> None:
+        while (job := queue.get()[-1]) is not None:
             job.run()
-            with self._changed:
-                self._running.discard(job)
             del job  # or its result would live until the next one
-
-    def _take(self, only_small: bool) -> Job[object] | None:
-        with self._changed:
-            while not self._is_closed:
-                mine = [job for job in self._waiting if job.cost_s <= SMALL_S or not only_small]
-                ordered = sorted(mine, key=lambda job: job.due_s)  # stable: as they arrived
-                admitted = (job for job in ordered if self._admits(job.cost_s))
-                if (job := next(admitted, None)) is not None:
-                    self._waiting.remove(job)
-                    self._running.add(job)
-                    return job
-                self._changed.wait(_CHECK_S if mine else None)
-            return None
 
 
 def in_turns(
@@ -202,6 +153,8 @@ def in_turns(
             begun_s = clock()
 
 
+# How often a job asks again whether it may begin, s.
+_CHECK_S: Final = 0.05
 # Small, and large, jobs of a queue that have no answer yet, at most.
 MAX_JOBS: Final = 32
 # Time between two small, or two large, jobs while the owner's thread is behind, s.
@@ -214,7 +167,7 @@ class JobQueue:
     A job begins only when every answer was delivered, because the largest takes about 200 MB. While
     `is_behind()` (messages wait for the owner's thread), one small and one large job begin a
     second. `wake()` is called in another thread when `deliver` has something to do. `clock` returns
-    seconds and never jumps; the other arguments are those of `Workers`. `answered` counts answers,
+    seconds and never jumps; `large_threads` is that of `Workers`. `answered` counts answers,
     `slowest_s` is the longest that one took.
     """
 
@@ -226,17 +179,17 @@ class JobQueue:
         clock: Callable[[], float] = time.monotonic,
         *,
         large_threads: int = LARGE_THREADS,
-        small_threads: int = SMALL_THREADS,
     ) -> None:
         self.answered = 0
         self.slowest_s = 0.0
-        self._workers = Workers(name, clock, large_threads, small_threads, self._admits)
+        self._workers = Workers(name, clock, large_threads)
         self._wake = wake
         self._is_behind = is_behind
         self._clock = clock
         # Of small jobs, and of large ones: those without an answer, and when the last was begun.
         self._open = [0, 0]
         self._begun_s = [-math.inf, -math.inf]
+        self._changed = threading.Condition()
         self._done: deque[Callable[[], None]] = deque()
 
     @property
@@ -269,6 +222,11 @@ class JobQueue:
             reply(answer)
 
         def run(should_stop: ShouldStop) -> None:
+            with self._changed:
+                while not self._admits(is_large):
+                    if should_stop():
+                        return
+                    self._changed.wait(_CHECK_S)
             try:
                 answer = work(should_stop)
             except Exception as error:  # noqa: BLE001  # handed to whoever waits
@@ -289,7 +247,8 @@ class JobQueue:
             self._done[0]()
         finally:
             self._done.popleft()
-            self._workers.look_again()
+            with self._changed:
+                self._changed.notify_all()
             if self._done:
                 self._wake()
 
@@ -297,8 +256,8 @@ class JobQueue:
         """End the threads; their current work is abandoned."""
         self._workers.close()
 
-    def _admits(self, cost_s: float) -> bool:
-        is_large, now_s = cost_s > SMALL_S, self._clock()
+    def _admits(self, is_large: bool) -> bool:
+        now_s = self._clock()
         if self._done or (self._is_behind() and now_s - self._begun_s[is_large] < PACE_S):
             return False
         self._begun_s[is_large] = now_s

@@ -160,7 +160,7 @@ def test_dragging_shows_each_moment_as_in_the_journal(page: Hmi, hour: Hour) -> 
     assert len(check_seen(page, hour)) > 4
 
 
-def test_the_end_of_the_bar_is_now_and_before_the_log_is_nothing_and_between_is_the_past(
+def test_the_bar_is_from_the_log_until_now_and_before_the_log_is_nothing(
     page: Hmi, hour: Hour
 ) -> None:
     press_at(page, 0.6)
@@ -168,6 +168,8 @@ def test_the_end_of_the_bar_is_now_and_before_the_log_is_nothing_and_between_is_
     press_at(page, 0.999)
     expect_now(page)
     press_at(page, 0.01)
+    assert expect_past(page) > hour.begun_s  # the log is shorter than an hour
+    page.turn(f"at={hour.begun_s - 60}&period=hour")
     notice = page.test_id("notice")
     expect(notice).to_have_attribute("data-notice", "past-nothing")
     expect(notice).to_contain_text("Recorded data begins at")

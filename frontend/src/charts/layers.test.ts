@@ -1,7 +1,8 @@
 import { expect, test, vi } from 'vitest';
 
+import { seriesWith } from '../testing/timeline';
 import { MOST_CHARTED } from '../store/view';
-import { drawMarks, type Frame, lookOf, markerPath, without } from './layers';
+import { common, drawBelow, drawMarks, type Frame, lookOf, markerPath, without } from './layers';
 import type { Line } from './model';
 
 const all = Array.from({ length: MOST_CHARTED }, (_, index) => lookOf(index));
@@ -28,6 +29,29 @@ test('marks of inspections are dots, smaller than the crosses of failures', () =
   drawMarks(frame as unknown as Frame, { marks } as unknown as Line);
   expect(String(fill.mock.calls[0])).toBe(markerPath('circle', 30, 58, 3));
   expect(String(stroke.mock.calls[0])).toBe(markerPath('cross', 30, 70, 6));
+});
+
+test('several lines have the gaps that all of them have, and only those are hatched', () => {
+  const gaps = [
+    { from: 0, to: 10 },
+    { from: 20, to: 30 },
+  ];
+  const others = [{ from: 5, to: 25 }];
+  expect(common([gaps])).toEqual(gaps);
+  expect(common([gaps, others, [{ from: 0, to: 22 }]])).toEqual([
+    { from: 5, to: 10 },
+    { from: 20, to: 22 },
+  ]);
+  const names = ['save', 'restore', 'beginPath', 'rect', 'clip', 'moveTo', 'lineTo', 'stroke'];
+  const context = Object.fromEntries(names.map((name) => [name, vi.fn()]));
+  const lines = [gaps, others].map((each) => ({ series: seriesWith({ gaps: each }) }));
+  const box = { left: 0, top: 0, width: 100, height: 50 };
+  const model = { lines, bands: [] };
+  drawBelow({ context, ratio: 1, box, x: Number, colour: String, model } as unknown as Frame);
+  expect(context['rect']?.mock.calls.slice(1)).toEqual([
+    [5, 0, 5, 50],
+    [20, 0, 5, 50],
+  ]);
 });
 
 test('a gap is hatched once: where the journal is incomplete, only as that', () => {

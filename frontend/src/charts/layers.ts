@@ -33,9 +33,7 @@ export function drawBelow(frame: Frame): void {
   const { context, model } = frame;
   clip(frame);
   drawIdeal(frame);
-  // With several lines, a gap of one would lie behind another.
-  const [only] = model.lines;
-  if (only && model.lines.length === 1) drawGaps(frame, only);
+  drawGaps(frame);
   for (const line of model.lines) drawRanges(frame, line);
   context.restore();
 }
@@ -67,14 +65,20 @@ function drawIdeal({ context, ratio, x, y, model, colour }: Frame): void {
   }
 }
 
-/** Hatched, so that a gap does not look like a fault of the page. */
-function drawGaps(frame: Frame, { series }: Line): void {
+/** Hatched as on the time bar where no line has data, so that a gap does not look like a fault of the page. */
+function drawGaps(frame: Frame): void {
   frame.context.strokeStyle = frame.colour('chart-gap');
   frame.context.lineWidth = frame.ratio;
-  hatched(frame, without(series.gaps, series.missing), 1);
+  const all = frame.model.lines.map(({ series }) => series);
+  const missing = common(all.map((series) => series.missing));
+  hatched(frame, without(common(all.map(({ gaps }) => gaps)), missing), -1);
   // Leaning the other way: whether anything was received is not known.
-  hatched(frame, series.missing, -1);
+  hatched(frame, missing, 1);
 }
+
+/** The parts of spans that all lists have. */
+export const common = (lists: readonly (readonly Span[])[]): readonly Span[] =>
+  lists.length === 0 ? [] : lists.reduce((both, other) => without(both, without(both, other)));
 
 /** What is left of spans outside others. */
 export const without = (spans: readonly Span[], others: readonly Span[]): readonly Span[] =>

@@ -46,8 +46,8 @@ export function useCharts(
   const nowS = rosNow(store.get(), useNow());
   const visits = useVisits(tagIds);
   const answered = useRef('');
-  const oldest = period.kind === 'all' ? (known?.reach?.from ?? null) : null;
-  // How far the past reaches decides how long all of it is, and which period the page opens on.
+  const oldest = known?.reach?.from ?? null;
+  // How far the past reaches decides where a period begins, and which one the page opens on.
   const isEarly =
     (period.kind === 'all' || period === DEFAULT_VIEW.period) &&
     known === null &&

@@ -69,6 +69,8 @@ test.each([
   ['month', 30 * 86_400],
 ] as const)('the last %s ends now', (kind, length) => {
   expect(spanOf({ kind }, NOW, null)).toEqual({ from: NOW - length, to: NOW });
+  expect(spanOf({ kind }, NOW, 0)).toEqual({ from: NOW - length, to: NOW });
+  expect(spanOf({ kind }, NOW, NOW - 500), 'a young twin').toEqual({ from: NOW - 500, to: NOW });
 });
 
 test('everything begins with memory, and is a day as long as nobody knows', () => {

@@ -86,12 +86,15 @@ export interface Span {
   readonly to: number;
 }
 
-/** A period's span. `now` is the twin's time, `oldest` the beginning of the history; null: not known. */
+/**
+ * A period's span; one that ends now begins with the history if that is shorter. `now` is the twin's
+ * time, `oldest` the beginning of the history; null: not known.
+ */
 export function spanOf(period: Period, now: number, oldest: number | null): Span {
   if (period.kind === 'own') return { from: period.from, to: period.to };
-  return period.kind === 'all'
-    ? { from: Math.min(oldest ?? now - LENGTHS.day, now - 1), to: now }
-    : { from: Math.max(0, now - LENGTHS[period.kind]), to: now };
+  const longest = oldest === null ? LENGTHS.day : Infinity;
+  const length = period.kind === 'all' ? longest : LENGTHS[period.kind];
+  return { from: Math.max(0, Math.min(Math.max(oldest ?? 0, now - length), now - 1)), to: now };
 }
 
 export const endsNow = (period: Period): boolean => period.kind !== 'own';

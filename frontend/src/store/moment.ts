@@ -4,7 +4,7 @@
  */
 import { now } from '../clock';
 import type { StatusFrame } from '../contract/types';
-import { type Span, spanOf } from '../domain/time';
+import { endsNow, type Span, spanOf } from '../domain/time';
 import { DAY_S } from '../domain/difference';
 import { memoLast, memoOne } from '../domain/memo';
 import type { Snapshot, Tag } from '../domain/twin';
@@ -165,10 +165,13 @@ export function ownTime(state: AppState, at: number): number | null {
   return rosNow(state, isReceivingNow(state) ? at : -Infinity);
 }
 
-/** The span of the drawn timeline; until one arrives, that of the requested period. */
+/** The span of the drawn timeline, without what is before the history; until one arrives, the period's. */
 export function barSpan(state: AppState, nowS: number): Span {
   const { value } = state.twin.remembered;
-  if (value && value.to > value.from) return value;
+  if (value && value.to > value.from) {
+    const oldest = endsNow(state.view.period) ? (value.reach?.from ?? 0) : 0;
+    return { from: Math.max(value.from, Math.min(oldest, value.to - 1)), to: value.to };
+  }
   const { from, to } = spanOf(state.view.period, nowS, null);
   return { from, to: Math.max(to, from + 1) };
 }

@@ -36,16 +36,19 @@ const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
 
 describe('what is asked', () => {
   test('is whole buckets, so that those that have passed stay the same', () => {
-    const first = requestedSpan({ kind: 'hour' }, 1_000_007);
-    const next = requestedSpan({ kind: 'hour' }, 1_000_009);
+    const first = requestedSpan({ kind: 'hour' }, 1_000_007, null);
+    const next = requestedSpan({ kind: 'hour' }, 1_000_009, null);
     expect(first).toEqual({ from: 996_420, to: 1_000_020 });
     expect(next).toEqual(first);
-    expect(requestedSpan({ kind: 'hour' }, 1_000_021)).toEqual({ from: 996_450, to: 1_000_050 });
+    expect(requestedSpan({ kind: 'hour' }, 1_000_021, null)).toEqual({
+      from: 996_450,
+      to: 1_000_050,
+    });
   });
 
   test('is all there is, or exactly what was chosen', () => {
-    expect(requestedSpan({ kind: 'all' }, 50)).toBeNull();
-    expect(requestedSpan({ kind: 'own', from: 3, to: 10 }, 50)).toEqual({ from: 3, to: 10 });
+    expect(requestedSpan({ kind: 'all' }, 50, null)).toBeNull();
+    expect(requestedSpan({ kind: 'own', from: 3, to: 10 }, 50, 5)).toEqual({ from: 3, to: 10 });
   });
 
   test('is asked again once a bucket, and at least every half minute; not of what is over', () => {
@@ -64,6 +67,16 @@ test('it is fetched when there is a twin, and again as time goes on', async () =
   expect(requests).toHaveLength(1);
   await pass(31_000);
   expect(requests.length).toBeGreaterThan(1);
+});
+
+test('of a young twin the period is fetched again, from where its history begins', async () => {
+  receive(withState(stateFrame([wireTag()], { sec: 1_000_000 }), performance.now()));
+  const reach = { from: 999_000, to: 1_000_000 };
+  answer = () => Response.json(wireTimeline({ from: 996_400, to: 1_000_000, reach }));
+  act({ period: { kind: 'hour' } });
+  await pass(3_000);
+  const begins = requests.slice(1).map((query) => Number(query.get('from')));
+  expect(begins).toEqual([996_420, 999_000]);
 });
 
 test('another period is fetched at once, and nothing of the last is left', async () => {

@@ -16,11 +16,11 @@ const INTERVAL_MS = 1_000;
 const SOONEST_S = 5;
 const LATEST_S = 30;
 
-/** The span to request: whole buckets, so that past ones stay the same. */
-export function requestedSpan(period: Period, nowS: number): Span | null {
+/** The span to request: whole buckets, so that past ones stay the same, unless all begin with the history. */
+export function requestedSpan(period: Period, nowS: number, oldest: number | null): Span | null {
   if (period.kind === 'all') return null;
-  const span = spanOf(period, nowS, null);
-  if (!endsNow(period)) return span;
+  const span = spanOf(period, nowS, oldest);
+  if (!endsNow(period) || span.from === oldest) return span;
   const bucketS = (span.to - span.from) / BUCKETS;
   const to = Math.ceil(span.to / bucketS) * bucketS;
   return { from: Math.max(0, to - (span.to - span.from)), to };
@@ -68,11 +68,12 @@ export function startRemembered(signal = PAGE): void {
         // That may have restored the previous period.
         if (store.get().view.period !== period) return undefined;
       }
+      const oldest = store.get().twin.remembered.value?.reach?.from ?? null;
       return {
-        key: `${epoch}|${turnOf(period, nowS)}`,
+        key: `${epoch}|${turnOf(period, nowS)}|${requestedSpan(period, nowS, oldest)?.from === oldest}`,
         group: String(changes),
         run: (on) =>
-          fetchTimeline(requestedSpan(period, nowS), BUCKETS, on).then((wire) =>
+          fetchTimeline(requestedSpan(period, nowS, oldest), BUCKETS, on).then((wire) =>
             timelineOf(wire, nowS),
           ),
       };

@@ -12,11 +12,14 @@ import { fieldOf, momentOf, TimeBar } from './TimeBar';
 
 const NOW = 10_000;
 
-const remember = (from: number, to: number): void => {
+const remember = (from: number, to: number, oldest = from): void => {
   const buckets = [
     { start: 9_000, scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
   ];
-  const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }), NOW);
+  const value = timelineOf(
+    wireTimeline({ from, to, reach: { from: oldest, to }, bucket_s: 15, buckets }),
+    NOW,
+  );
   receive({ remembered: { value, state: 'ready', message: '' } });
 };
 
@@ -88,6 +91,16 @@ test('the end of the bar is not live while the page is not', () => {
   expect(said()).toEqual(['Time unknown', 'Time unknown']);
   flush(goLost);
   expect(said()).toEqual(['Reconnecting', 'Reconnecting']);
+});
+
+test('the bar of a young twin begins with its history, but an own period as chosen', () => {
+  remember(6_400, NOW, 9_000);
+  render(<TimeBar />);
+  expect(slider().dataset['span']).toBe('9000,10000');
+  flush(() => {
+    act({ period: { kind: 'own', from: 6_400, to: NOW } });
+  });
+  expect(slider().dataset['span']).toBe('6400,10000');
 });
 
 test('how fast the past is played is chosen where there is a past to play', () => {

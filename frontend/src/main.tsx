@@ -40,6 +40,8 @@ onChange(
   ({ settings }) => [settings],
   () => keepSettings(storage, store.get().settings),
 );
+// Tabs share them: a sound that is turned off in one stops in all.
+window.addEventListener('storage', () => prefer(readSettings(storage)));
 
 const kiosk = new URLSearchParams(window.location.search).has('kiosk');
 const cycle = cycleSeconds(window.location.search);

@@ -3,7 +3,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import pushes from '../../public/sw.js?raw';
 import type { Alarm } from '../contract/types';
-import { act, receive, store } from '../store/app';
+import { act, prefer, receive, store } from '../store/app';
 import { announce } from '../store/create';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { started } from '../testing/life';
@@ -207,7 +207,7 @@ describe('sound', () => {
 
   test('enabled on an earlier visit, it waits for a click, and says so', async () => {
     const audio = new Audio(false);
-    own.set({ ...NO_LOCAL_ALARMS, sound: true });
+    prefer({ sound: true });
     start((on) => startSound(() => audio as unknown as AudioContext, on));
     expect(soundState.get()).toBe('waits');
     document.dispatchEvent(new Event('pointerup'));
@@ -276,7 +276,11 @@ describe('notification', () => {
     reportAlarms(warm);
     expect([log.requests, shown.length]).toEqual([0, 0]);
     await setNotify(true);
-    expect([log.requests, own.get().notify, notifyState.get()]).toEqual([1, true, 'granted']);
+    expect([log.requests, store.get().settings.notify, notifyState.get()]).toEqual([
+      1,
+      true,
+      'granted',
+    ]);
     reportAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     expect(shown.map(({ title }) => title)).toEqual(['2 new alarms']);
     expect(shown[0]?.body).toMatch(/^New: Tag 1: .*; Tag 3: /);
@@ -327,10 +331,10 @@ describe('notification', () => {
     browser('default', 'denied');
     start(startNotify);
     await setNotify(true);
-    expect([own.get().notify, notifyState.get()]).toEqual([false, 'refused']);
+    expect([store.get().settings.notify, notifyState.get()]).toEqual([false, 'refused']);
     vi.stubGlobal('isSecureContext', false);
     await setNotify(true);
-    expect([own.get().notify, notifyState.get()]).toEqual([false, 'insecure']);
+    expect([store.get().settings.notify, notifyState.get()]).toEqual([false, 'insecure']);
   });
 
   test('a phone shows it by the service worker; a browser that cannot at all is reported', async () => {
@@ -351,11 +355,11 @@ describe('notification', () => {
     await vi.waitFor(() => {
       expect(showNotification.mock.lastCall?.[0]).toBe('1 new alarm');
     });
-    expect([own.get().notify, notifyState.get()]).toEqual([true, 'granted']);
+    expect([store.get().settings.notify, notifyState.get()]).toEqual([true, 'granted']);
     vi.stubGlobal('navigator', {});
     reportAlarms(warm, cold);
     await vi.waitFor(() => {
-      expect([own.get().notify, notifyState.get()]).toEqual([false, 'none']);
+      expect([store.get().settings.notify, notifyState.get()]).toEqual([false, 'none']);
     });
   });
 });

@@ -22,6 +22,8 @@ test('what was kept comes back', () => {
     hidden: ['pest', 'co2'],
     byArea: true,
     dayBefore: true,
+    sound: true,
+    notify: true,
   } as const;
   keepSettings({ setItem: (_, value) => (stored = value) }, settings);
   expect(readSettings(storage(stored))).toEqual(settings);

@@ -11,6 +11,9 @@ export interface Settings {
   /** Whether the table's rows are grouped by area, if there are areas. */
   readonly byArea: boolean;
   readonly dayBefore: boolean;
+  /** Whether new alarms are heard, and shown while nobody looks at the page. */
+  readonly sound: boolean;
+  readonly notify: boolean;
 }
 
 export const DEFAULT_SETTINGS: Settings = {
@@ -20,6 +23,8 @@ export const DEFAULT_SETTINGS: Settings = {
   hidden: [],
   byArea: false,
   dayBefore: false,
+  sound: false,
+  notify: false,
 };
 
 /** The tag's own column is always shown. */

@@ -74,12 +74,8 @@ const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'health
 
 /** null: no frame of the overview. */
 export function parseSites(data: unknown): SitesFrame | null {
-  try {
-    const frame = inSeconds(JSON.parse(String(data))) as SitesFrame | { readonly type: '' };
-    return frame.type === 'sites' ? frame : null;
-  } catch {
-    return null;
-  }
+  const frame = inSeconds(JSON.parse(String(data))) as SitesFrame | { readonly type: '' };
+  return frame.type === 'sites' ? frame : null;
 }
 
 export function withFrame(before: Sites, frame: SitesFrame): Sites {

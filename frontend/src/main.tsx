@@ -63,7 +63,6 @@ if (kiosk) {
 }
 
 void loadParts().then((parts) => {
-  parts.startGestures();
   parts.startDifference();
   parts.startBadge();
   parts.startSound();

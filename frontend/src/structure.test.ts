@@ -87,10 +87,7 @@ const TABLE: Table = {
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'connection'],
     ...['npm:react', 'npm:react-dom'],
   ],
-  map: [
-    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
-    ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],
-  ],
+  map: [...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'], 'npm:react'],
   // What goes on about alarms beside the components, which are in `ui/alarms`.
   alarms: ['strings', 'clock', 'contract', 'domain', 'store', 'map'],
   widgets: ['clock', 'npm:react'],

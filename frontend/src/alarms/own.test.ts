@@ -38,17 +38,6 @@ test.each([null, '', '{', 'null', '7', '{"acknowledged":7,"shelved":{}}'])(
   },
 );
 
-test('a full storage does no harm', () => {
-  const full = {
-    setItem: () => {
-      throw new Error('quota');
-    },
-  };
-  expect(() => {
-    writeStored(full, NO_LOCAL_ALARMS);
-  }).not.toThrow();
-});
-
 test('what was acknowledged long ago is forgotten, unless it is still listed', () => {
   const local = acknowledge(NO_LOCAL_ALARMS, [rated('a'), rated('b')], AT);
   expect(pruned(local, new Set(), AT + FORGET_MS - 1)).toBe(local);

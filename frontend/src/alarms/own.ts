@@ -6,6 +6,7 @@ import { timeOfDay } from '../clock';
 import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { createStore, PAGE } from '../store/create';
+import { keepStored } from '../store/settings';
 
 /** An acknowledgement of an alarm no longer listed is deleted after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
@@ -122,28 +123,24 @@ const KEY = 'lupin-twin.alarms';
 
 /** Maps as their entries. */
 interface Stored {
-  readonly acknowledged: readonly (readonly [id: string, Acknowledgement])[];
-  readonly shelved: readonly (readonly [what: string, Shelf])[];
+  readonly acknowledged?: readonly (readonly [id: string, Acknowledgement])[];
+  readonly shelved?: readonly (readonly [what: string, Shelf])[];
 }
 
 /** Reads the stored state; a damaged one counts as empty. */
 export function readStored(storage: Pick<Storage, 'getItem'>): LocalAlarms {
   try {
-    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Stored>;
+    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Stored;
     return { acknowledged: new Map(stored.acknowledged), shelved: new Map(stored.shelved) };
   } catch {
     return NO_LOCAL_ALARMS;
   }
 }
 
-export function writeStored(storage: Pick<Storage, 'setItem'>, local: LocalAlarms): void {
-  const stored: Stored = { acknowledged: [...local.acknowledged], shelved: [...local.shelved] };
-  try {
-    storage.setItem(KEY, JSON.stringify(stored));
-  } catch {
-    // Storage is full or blocked: the state then lasts as long as the page.
-  }
-}
+export const writeStored = (
+  storage: Pick<Storage, 'setItem'>,
+  { acknowledged, shelved }: LocalAlarms,
+): void => keepStored(storage, KEY, { acknowledged: [...acknowledged], shelved: [...shelved] });
 
 export const own = createStore<LocalAlarms>(NO_LOCAL_ALARMS);
 

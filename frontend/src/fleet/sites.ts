@@ -4,9 +4,9 @@ import { inSeconds } from '../contract/stamps';
 import type { HealthReason, Verdict } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
-import { fleetWordsOf } from '../words/fleet';
+import { FLEET_WORDS } from '../words/fleet';
 
-export const words = fleetWordsOf(LANGUAGE);
+export const words = FLEET_WORDS[LANGUAGE];
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
 interface SiteEntry {

@@ -210,9 +210,9 @@ let context: AudioContext | null = null;
 let playedAt = -Infinity;
 
 /** Creates or resumes the audio context; the browser allows it only within a user gesture. */
-async function wake(make: () => AudioContext): Promise<void> {
+async function wake(): Promise<void> {
   try {
-    context ??= make();
+    context ??= new AudioContext();
   } catch {
     soundState.set('none');
     return;
@@ -229,22 +229,19 @@ function sound(notes: readonly number[]): void {
 }
 
 /** Turns sound on or off, on a click; plays a sample at once when turned on. */
-export async function setSound(
-  isRequested: boolean,
-  make: () => AudioContext = () => new AudioContext(),
-): Promise<void> {
+export async function setSound(isRequested: boolean): Promise<void> {
   prefer({ sound: isRequested });
   if (!isRequested) return;
-  await wake(make);
+  await wake();
   playedAt = -Infinity;
   sound(NOTES.other);
 }
 
 /** Plays a sound for new alarms if enabled. */
-export function startSound(make = (): AudioContext => new AudioContext(), signal = PAGE): void {
+export function startSound(signal = PAGE): void {
   // Enabled on an earlier visit: the first click or key unlocks the sound.
   const onGesture = (): void => {
-    if (store.get().settings.sound && context?.state !== 'running') void wake(make);
+    if (store.get().settings.sound && context?.state !== 'running') void wake();
   };
   document.addEventListener('pointerup', onGesture, { signal });
   document.addEventListener('keyup', onGesture, { signal });

@@ -180,5 +180,5 @@ export function useWhoAcknowledged(alarm: Alarm | null): string | null {
   const name = alarm?.acknowledged_by;
   const at = alarm?.acknowledged_at;
   const when = useTicking((tick) => (at == null ? '' : whenText(at, rosNow(store.get(), tick))));
-  return name && when !== '' ? C.acknowledged(name, when) : null;
+  return name && when !== '' ? S.alarmAcknowledgedBy(name, when) : null;
 }

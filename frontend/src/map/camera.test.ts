@@ -231,6 +231,7 @@ describe('camera', () => {
   test('a click is no choice of a view', () => {
     camera.goTo(null, content);
     mouse(element, 'pointerdown', 100);
+    mouse(element, 'pointermove', 100);
     mouse(element, 'pointerup', 100);
     expect(onCamera).not.toHaveBeenCalled();
     camera.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });

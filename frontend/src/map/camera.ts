@@ -58,7 +58,7 @@ export class MapCamera {
       this.#held ??= viewport().view;
     };
     const onMove = (from: CanvasPoint, to: CanvasPoint, factor: number): void => {
-      moveViewport({ view: this.#moved(from, to, factor) });
+      this.#show(this.#moved(from, to, factor));
     };
     const onEnd = (): void => {
       // A click is a gesture too, but moves nothing.
@@ -75,7 +75,7 @@ export class MapCamera {
    */
   goTo(camera: Camera | null, content: Content | null, covered: readonly Box[] = []): void {
     if (this.#held !== null) return;
-    const { view: before, size } = viewport();
+    const { size } = viewport();
     if (size.width === 0 || size.height === 0) return;
     const whole = content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
     if (whole) {
@@ -83,7 +83,7 @@ export class MapCamera {
       this.#leastScale = whole.scale / 2;
     }
     const view = camera ? this.#inSight(viewOf(camera, size, this.#leastScale)) : whole;
-    if (view && !isSame(view, before)) moveViewport({ view });
+    if (view) this.#show(view);
   }
 
   #inSight(view: View): View {
@@ -100,13 +100,17 @@ export class MapCamera {
     return this.#inSight({ scale, x, y });
   }
 
+  #show(view: View): void {
+    if (!isSame(view, viewport().view)) moveViewport({ view });
+  }
+
   #choose(): void {
     const { view, size } = viewport();
     act({ camera: cameraOf(view, size) });
   }
 
   #step(view: View): void {
-    if (!isSame(view, viewport().view)) moveViewport({ view });
+    this.#show(view);
     if (this.#held === null) this.#choose();
   }
 

@@ -37,13 +37,6 @@ export default defineConfig({
   // Relative, so that any path prefix works.
   base: './',
   plugins: [react()],
-  // The map has no animations, so d3-zoom gets stubs.
-  resolve: {
-    alias: {
-      'd3-transition': here('src/map/instantly.ts'),
-      'd3-interpolate': here('src/map/instantly.ts'),
-    },
-  },
   build: {
     outDir: here('../backend/lupin_bridge/static'),
     emptyOutDir: true,
@@ -76,8 +69,6 @@ export default defineConfig({
     restoreMocks: true,
     // See src/testing/asFound.ts.
     isolate: false,
-    // Otherwise the aliases above would not apply to it.
-    server: { deps: { inline: ['d3-zoom'] } },
     // A busy machine is slow; a hanging test still fails.
     testTimeout: 30_000,
     unstubGlobals: true,

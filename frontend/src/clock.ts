@@ -9,17 +9,14 @@
 
 /** Tolerated drift between two readings, ms; slewing stays far below. */
 const LAPSE_MS = 2_000;
-/** Lapses remembered, for the time of day of earlier moments. */
-const MOST_ERAS = 100;
-
 /** Hears `lapse` when time has lapsed. */
 export const lapses = new EventTarget();
-/** The last monotonic reading. */
-let last = performance.now();
-/** Periods without a lapse: their beginning, and the wall clock minus the monotonic one. */
-let eras: readonly { readonly from: number; readonly offset: number }[] = [
-  { from: -Infinity, offset: Date.now() - last },
-];
+
+const offsetNow = (): number => Date.now() - performance.now();
+/** The present period without a lapse: its beginning, and the wall clock minus the monotonic one. */
+let era = { from: -Infinity, offset: offsetNow() };
+/** All periods, the latest first, for the time of day of earlier moments. */
+const eras = [era];
 
 /**
  * ms on the monotonic clock: for differences, never for a time of day. Each call checks for a lapse and
@@ -27,29 +24,25 @@ let eras: readonly { readonly from: number; readonly offset: number }[] = [
  */
 export function now(): number {
   const at = performance.now();
-  const offset = Date.now() - at;
-  const era = eras.at(-1);
-  const hasGoneBack = at < last;
-  last = at;
-  if (era && !hasGoneBack && offset - era.offset > LAPSE_MS) {
-    eras = [...eras.slice(-MOST_ERAS), { from: at, offset }];
+  const offset = offsetNow();
+  if (offset - era.offset > LAPSE_MS) {
+    era = { from: at, offset };
+    eras.unshift(era);
     lapses.dispatchEvent(new Event('lapse'));
-    return at;
+  } else {
+    // Slewed or set back: the newer offset is the better one.
+    era.offset = offset;
   }
-  // Slewed or set back: the newer offset is the better one.
-  const before = hasGoneBack ? [] : eras.slice(0, -1);
-  eras = [...before, { from: before.length > 0 ? (era?.from ?? at) : -Infinity, offset }];
   return at;
 }
 
 /** Time of day, ms since the epoch, of a moment on the monotonic clock, as it was then. */
 export function epochOf(moment: number): number {
-  const era = eras.findLast(({ from }) => from <= moment) ?? eras[0];
-  const offset = Date.now() - performance.now();
-  if (!era) return moment + offset;
+  const then = eras.find(({ from }) => from <= moment) ?? era;
+  const offset = offsetNow();
   // In the present period, the present offset, unless there is an undetected lapse.
-  const isPresent = era === eras.at(-1) && offset - era.offset <= LAPSE_MS;
-  return moment + (isPresent ? offset : era.offset);
+  const isPresent = then === era && offset - era.offset <= LAPSE_MS;
+  return moment + (isPresent ? offset : then.offset);
 }
 
 /** Time of day on the operator's own clock, ms since the epoch. */

@@ -26,7 +26,7 @@ import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
 import { startLoaders, startSensors } from './store/loaders';
 import { startPast } from './store/past';
-import { keepSettings, openStorage, readSettings } from './store/settings';
+import { keepStored, openStorage, readSettings, SETTINGS_KEY } from './store/settings';
 import { startTheme } from './store/theme';
 import { LANGUAGE, S } from './strings';
 import { App } from './ui/App';
@@ -38,8 +38,10 @@ const storage = openStorage();
 prefer(readSettings(storage));
 onChange(
   ({ settings }) => [settings],
-  () => keepSettings(storage, store.get().settings),
+  () => keepStored(storage, SETTINGS_KEY, store.get().settings),
 );
+// Tabs share them: a sound that is turned off in one stops in all.
+window.addEventListener('storage', () => prefer(readSettings(storage)));
 
 const kiosk = new URLSearchParams(window.location.search).has('kiosk');
 const cycle = cycleSeconds(window.location.search);
@@ -61,7 +63,6 @@ if (kiosk) {
 }
 
 void loadParts().then((parts) => {
-  parts.startGestures();
   parts.startDifference();
   parts.startBadge();
   parts.startSound();

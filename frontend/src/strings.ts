@@ -22,8 +22,4 @@ export const LANGUAGE = words ? chosen.language : 'en';
 export const LOCALE = words ? chosen.locale : 'en-GB';
 
 /** Why it is not the requested language; null: it is. */
-export const LANGUAGE_TROUBLE: string | null = !words
-  ? S.languageMissing(LANGUAGE_NAMES[chosen.language])
-  : chosen.unknown === null
-    ? null
-    : S.languageUnknown(chosen.unknown);
+export const LANGUAGE_TROUBLE = words ? null : S.languageMissing(LANGUAGE_NAMES[chosen.language]);

@@ -87,10 +87,7 @@ const TABLE: Table = {
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'connection'],
     ...['npm:react', 'npm:react-dom'],
   ],
-  map: [
-    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
-    ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],
-  ],
+  map: [...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'], 'npm:react'],
   // What goes on about alarms beside the components, which are in `ui/alarms`.
   alarms: ['strings', 'clock', 'contract', 'domain', 'store', 'map'],
   widgets: ['clock', 'npm:react'],
@@ -102,7 +99,7 @@ const TABLE: Table = {
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'widgets', 'export'],
     ...['notes', 'styles', 'npm:react', 'npm:uplot'],
   ],
-  // Loaded when first needed: what the page has of the estimate, and of the robot.
+  // What the page has of the estimate, loaded when first shown, and of the robot.
   parts: [
     ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
     ...['npm:react', 'npm:react-dom'],

@@ -3,7 +3,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import pushes from '../../public/sw.js?raw';
 import type { Alarm } from '../contract/types';
-import { act, receive, store } from '../store/app';
+import { act, prefer, receive, store } from '../store/app';
 import { announce } from '../store/create';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { started } from '../testing/life';
@@ -173,6 +173,16 @@ class Audio {
 }
 
 describe('sound', () => {
+  const stubAudio = (audio: Audio): void => {
+    vi.stubGlobal(
+      'AudioContext',
+      class {
+        constructor() {
+          return audio;
+        }
+      },
+    );
+  };
   const many = (count: number): Alarm[] =>
     Array.from({ length: count }, (_, at) =>
       alarm(`a${at}`, { tag_id: String(at), reason: STRESSED }),
@@ -180,14 +190,14 @@ describe('sound', () => {
 
   test('only if enabled: a sample at once, then at most one sound in ten seconds', async () => {
     const audio = new Audio(true);
-    const make = (): AudioContext => audio as unknown as AudioContext;
+    stubAudio(audio);
     const at = Math.ceil(performance.now()); // otherwise ten seconds later rounds to slightly less
     const clock = vi.spyOn(performance, 'now').mockReturnValue(at);
     vi.spyOn(Date, 'now').mockReturnValue(1_800_000_000_000);
-    start((on) => startSound(make, on));
+    start(startSound);
     reportAlarms(...many(1));
     expect(audio.notes).toBe(0);
-    await setSound(true, make);
+    await setSound(true);
     expect(soundState.get()).toBe('ready');
     expect(audio.notes).toBe(2);
     clock.mockReturnValue(at + QUIET_MS - 1);
@@ -200,15 +210,16 @@ describe('sound', () => {
     reportAlarms(cold, ...many(3));
     expect(audio.notes).toBe(8);
     clock.mockReturnValue(at + 3 * QUIET_MS);
-    await setSound(false, make);
+    await setSound(false);
     reportAlarms(...many(4));
     expect(audio.notes).toBe(8);
   });
 
   test('enabled on an earlier visit, it waits for a click, and says so', async () => {
     const audio = new Audio(false);
-    own.set({ ...NO_LOCAL_ALARMS, sound: true });
-    start((on) => startSound(() => audio as unknown as AudioContext, on));
+    prefer({ sound: true });
+    stubAudio(audio);
+    start(startSound);
     expect(soundState.get()).toBe('waits');
     document.dispatchEvent(new Event('pointerup'));
     await vi.waitFor(() => {
@@ -228,9 +239,8 @@ describe('sound', () => {
 
   test('a browser that cannot says so', async () => {
     start();
-    await setSound(true, () => {
-      throw new Error('no device');
-    });
+    // jsdom has no sound.
+    await setSound(true);
     expect(soundState.get()).toBe('none');
     soundState.set('waits');
   });
@@ -276,7 +286,11 @@ describe('notification', () => {
     reportAlarms(warm);
     expect([log.requests, shown.length]).toEqual([0, 0]);
     await setNotify(true);
-    expect([log.requests, own.get().notify, notifyState.get()]).toEqual([1, true, 'granted']);
+    expect([log.requests, store.get().settings.notify, notifyState.get()]).toEqual([
+      1,
+      true,
+      'granted',
+    ]);
     reportAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     expect(shown.map(({ title }) => title)).toEqual(['2 new alarms']);
     expect(shown[0]?.body).toMatch(/^New: Tag 1: .*; Tag 3: /);
@@ -327,10 +341,10 @@ describe('notification', () => {
     browser('default', 'denied');
     start(startNotify);
     await setNotify(true);
-    expect([own.get().notify, notifyState.get()]).toEqual([false, 'refused']);
+    expect([store.get().settings.notify, notifyState.get()]).toEqual([false, 'refused']);
     vi.stubGlobal('isSecureContext', false);
     await setNotify(true);
-    expect([own.get().notify, notifyState.get()]).toEqual([false, 'insecure']);
+    expect([store.get().settings.notify, notifyState.get()]).toEqual([false, 'insecure']);
   });
 
   test('a phone shows it by the service worker; a browser that cannot at all is reported', async () => {
@@ -351,11 +365,11 @@ describe('notification', () => {
     await vi.waitFor(() => {
       expect(showNotification.mock.lastCall?.[0]).toBe('1 new alarm');
     });
-    expect([own.get().notify, notifyState.get()]).toEqual([true, 'granted']);
+    expect([store.get().settings.notify, notifyState.get()]).toEqual([true, 'granted']);
     vi.stubGlobal('navigator', {});
     reportAlarms(warm, cold);
     await vi.waitFor(() => {
-      expect([own.get().notify, notifyState.get()]).toEqual([false, 'none']);
+      expect([store.get().settings.notify, notifyState.get()]).toEqual([false, 'none']);
     });
   });
 });

@@ -3,13 +3,12 @@ import { now } from '../clock';
 import { request } from '../contract/api';
 import { postPush } from '../contract/people';
 import type { Verdict } from '../contract/types';
-import { onChange, store } from '../store/app';
+import { onChange, prefer, store } from '../store/app';
 import { createStore, PAGE } from '../store/create';
 import { selectOrigin } from '../store/moment';
 import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
-import { own, updateNotifySettings } from './own';
 import { severalNow, worstNow } from './latest';
 import { alarmList, onNews } from './watch';
 
@@ -39,7 +38,7 @@ export async function setNotify(isRequested: boolean): Promise<void> {
     notifyState.set(stateNow());
   }
   const isOn = isRequested && notifyState.get() === 'granted';
-  updateNotifySettings({ notify: isOn });
+  prefer({ notify: isOn });
   await tryPush(isOn);
 }
 
@@ -76,7 +75,7 @@ async function show(raised: readonly Item[]): Promise<void> {
     // Phones leave this to the service worker, and throw only here.
     if (await showByWorker(title, options)) return;
     notifyState.set('none');
-    updateNotifySettings({ notify: false });
+    prefer({ notify: false });
   }
 }
 
@@ -90,11 +89,12 @@ async function showByWorker(title: string, options: NotificationOptions): Promis
 export function startNotify(signal = PAGE): void {
   notifyState.set(stateNow());
   // Anew on each visit: the browser, its push service or the bridge may have forgotten it.
-  if (own.get().notify && notifyState.get() === 'granted') void tryPush(true);
+  if (store.get().settings.notify && notifyState.get() === 'granted') void tryPush(true);
   onNews(({ raised }) => {
     notifyState.set(stateNow());
     const isLooking = document.visibilityState === 'visible' && document.hasFocus();
-    if (own.get().notify && notifyState.get() === 'granted' && !isLooking) void show(raised);
+    if (store.get().settings.notify && notifyState.get() === 'granted' && !isLooking)
+      void show(raised);
   }, signal);
 }
 
@@ -210,9 +210,9 @@ let context: AudioContext | null = null;
 let playedAt = -Infinity;
 
 /** Creates or resumes the audio context; the browser allows it only within a user gesture. */
-async function wake(make: () => AudioContext): Promise<void> {
+async function wake(): Promise<void> {
   try {
-    context ??= make();
+    context ??= new AudioContext();
   } catch {
     soundState.set('none');
     return;
@@ -229,27 +229,24 @@ function sound(notes: readonly number[]): void {
 }
 
 /** Turns sound on or off, on a click; plays a sample at once when turned on. */
-export async function setSound(
-  isRequested: boolean,
-  make: () => AudioContext = () => new AudioContext(),
-): Promise<void> {
-  updateNotifySettings({ sound: isRequested });
+export async function setSound(isRequested: boolean): Promise<void> {
+  prefer({ sound: isRequested });
   if (!isRequested) return;
-  await wake(make);
+  await wake();
   playedAt = -Infinity;
   sound(NOTES.other);
 }
 
 /** Plays a sound for new alarms if enabled. */
-export function startSound(make = (): AudioContext => new AudioContext(), signal = PAGE): void {
+export function startSound(signal = PAGE): void {
   // Enabled on an earlier visit: the first click or key unlocks the sound.
   const onGesture = (): void => {
-    if (own.get().sound && context?.state !== 'running') void wake(make);
+    if (store.get().settings.sound && context?.state !== 'running') void wake();
   };
   document.addEventListener('pointerup', onGesture, { signal });
   document.addEventListener('keyup', onGesture, { signal });
   onNews(({ raised }) => {
-    if (raised.length === 0 || !own.get().sound) return;
+    if (raised.length === 0 || !store.get().settings.sound) return;
     const isCritical = raised.some(({ alarm }) => alarm.reason.verdict === 'critical');
     sound(NOTES[isCritical ? 'critical' : 'other']);
   }, signal);

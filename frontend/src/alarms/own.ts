@@ -1,13 +1,12 @@
 /**
- * This browser's alarm state, shared by its tabs: acknowledged and shelved alarms, and whether sound and
- * notifications are on. For a signed-in user, `people.ts` also sends actions to the bridge. Times are ms
- * since the epoch.
+ * This browser's alarm state, shared by its tabs: acknowledged and shelved alarms. For a signed-in user,
+ * `people.ts` also sends actions to the bridge. Times are ms since the epoch.
  */
 import { timeOfDay } from '../clock';
 import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
-import { store } from '../store/app';
-import { createStore, PAGE, person } from '../store/create';
+import { createStore, PAGE } from '../store/create';
+import { keepStored } from '../store/settings';
 
 /** An acknowledgement of an alarm no longer listed is deleted after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
@@ -44,16 +43,9 @@ export interface LocalAlarms {
   readonly acknowledged: ReadonlyMap<string, Acknowledgement>;
   /** By `faultKey`, so that the shelf still holds if the alarm is raised again. */
   readonly shelved: ReadonlyMap<string, Shelf>;
-  readonly sound: boolean;
-  readonly notify: boolean;
 }
 
-export const NO_LOCAL_ALARMS: LocalAlarms = {
-  acknowledged: new Map(),
-  shelved: new Map(),
-  sound: false,
-  notify: false,
-};
+export const NO_LOCAL_ALARMS: LocalAlarms = { acknowledged: new Map(), shelved: new Map() };
 
 /** Whether a verdict is worse than another. */
 export const isWorse = (a: Verdict, b: Verdict): boolean =>
@@ -130,38 +122,25 @@ export const nextEnd = (local: LocalAlarms, at: number): number =>
 const KEY = 'lupin-twin.alarms';
 
 /** Maps as their entries. */
-interface Stored extends Pick<LocalAlarms, 'sound' | 'notify'> {
-  readonly acknowledged: readonly (readonly [id: string, Acknowledgement])[];
-  readonly shelved: readonly (readonly [what: string, Shelf])[];
+interface Stored {
+  readonly acknowledged?: readonly (readonly [id: string, Acknowledgement])[];
+  readonly shelved?: readonly (readonly [what: string, Shelf])[];
 }
 
 /** Reads the stored state; a damaged one counts as empty. */
 export function readStored(storage: Pick<Storage, 'getItem'>): LocalAlarms {
   try {
-    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Stored>;
-    return {
-      ...NO_LOCAL_ALARMS,
-      ...stored,
-      acknowledged: new Map(stored.acknowledged),
-      shelved: new Map(stored.shelved),
-    };
+    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Stored;
+    return { acknowledged: new Map(stored.acknowledged), shelved: new Map(stored.shelved) };
   } catch {
     return NO_LOCAL_ALARMS;
   }
 }
 
-export function writeStored(storage: Pick<Storage, 'setItem'>, local: LocalAlarms): void {
-  const stored: Stored = {
-    ...local,
-    acknowledged: [...local.acknowledged],
-    shelved: [...local.shelved],
-  };
-  try {
-    storage.setItem(KEY, JSON.stringify(stored));
-  } catch {
-    // Storage is full or blocked: the state then lasts as long as the page.
-  }
-}
+export const writeStored = (
+  storage: Pick<Storage, 'setItem'>,
+  { acknowledged, shelved }: LocalAlarms,
+): void => keepStored(storage, KEY, { acknowledged: [...acknowledged], shelved: [...shelved] });
 
 export const own = createStore<LocalAlarms>(NO_LOCAL_ALARMS);
 
@@ -228,51 +207,25 @@ export const unshelveAlarms = (items: readonly WithAlarm[]): void => {
   change('unshelve', items, { shelved: without(own.get().shelved, faults) });
 };
 
-/** `now` with only those keys as before that the action changed and that nobody else has set since. */
-function reverted<Value>(
-  now: ReadonlyMap<string, Value>,
-  before: ReadonlyMap<string, Value>,
-  after: ReadonlyMap<string, Value>,
-  theirs: readonly string[],
-): ReadonlyMap<string, Value> {
-  const isOurs = ([key]: readonly [string, Value]): boolean =>
-    before.get(key) !== after.get(key) && !(now.has(key) && theirs.includes(key));
-  return new Map([...[...now].filter((each) => !isOurs(each)), ...[...before].filter(isOurs)]);
-}
-
-/** Undoes the last action; what others have done meanwhile stays. */
+/** Undoes the last action. */
 export function undo(): void {
   const last = lastAction.get();
   if (!last) return;
-  const { before, after } = last;
-  const now = own.get();
-  const name = person.get()?.name;
-  const { alarms = [] } = store.get().twin.alarms ?? {};
-  const isTheirs = (by: string | null | undefined): boolean => !!name && !!by && by !== name;
-  const acknowledged = alarms.filter((it) => isTheirs(it.acknowledged_by)).map(({ id }) => id);
-  const shelved = alarms.filter((it) => isTheirs(it.shelved_by)).map(faultKey);
-  own.set({
-    ...now,
-    acknowledged: reverted(now.acknowledged, before.acknowledged, after.acknowledged, acknowledged),
-    shelved: reverted(now.shelved, before.shelved, after.shelved, shelved),
-  });
+  own.set(last.before);
   setLastAction(null);
-  acting.share?.(now, own.get());
+  acting.share?.(last.after, last.before);
 }
-
-export const updateNotifySettings = (way: Partial<Pick<LocalAlarms, 'sound' | 'notify'>>): void => {
-  own.set({ ...own.get(), ...way });
-};
 
 /** Loads the stored state, and stores every change. */
 export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>, signal = PAGE): void {
   own.set(readStored(storage));
-  own.subscribe(() => writeStored(storage, own.get()), signal);
-  // Another tab changed the state: undoing here would undo its change too.
+  own.subscribe(() => {
+    writeStored(storage, own.get());
+    // Another tab or person changed the state: undoing here would undo that too.
+    if (lastAction.get()?.after !== own.get()) setLastAction(null);
+  }, signal);
   const onStorage = ({ key }: StorageEvent): void => {
-    if (key !== KEY && key !== null) return;
-    own.set(readStored(storage));
-    setLastAction(null);
+    if (key === KEY || key === null) own.set(readStored(storage));
   };
   window.addEventListener('storage', onStorage, { signal });
   signal.addEventListener('abort', () => setLastAction(null));

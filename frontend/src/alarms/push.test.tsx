@@ -1,14 +1,14 @@
 import { render, screen } from '@testing-library/react';
 import { afterEach, expect, test, vi } from 'vitest';
 
+import { prefer } from '../store/app';
 import { NotifySettings } from '../ui/alarms/AlarmNotes';
 import { isPushed, setNotify, setPush, startNotify } from './notify';
-import { NO_LOCAL_ALARMS, own } from './own';
 import { started } from '../testing/life';
 
 afterEach(() => {
   vi.unstubAllGlobals();
-  own.set(NO_LOCAL_ALARMS);
+  prefer({ notify: false });
 });
 
 /** Sets up a browser with a service worker and a bridge with this key; returns the log of calls. */
@@ -51,7 +51,7 @@ test('each visit subscribes anew: the push service may have ended the subscripti
   const log = stage('KEY');
   vi.stubGlobal('Notification', { permission: 'granted' });
   vi.stubGlobal('isSecureContext', true);
-  own.set({ ...NO_LOCAL_ALARMS, notify: true });
+  prefer({ notify: true });
   started(startNotify)();
   render(<NotifySettings />);
   // A grower who relies on the phone learns whether the bridge reaches it.

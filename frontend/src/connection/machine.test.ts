@@ -41,6 +41,7 @@ const started: ConnectionEvent[] = [
   { type: 'frame', now: 25, status: null },
 ];
 const live = run(...started).connection;
+const alarms = (now: number): ConnectionEvent => ({ type: 'frame', now, status: undefined });
 const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
   type: 'closed',
   now,
@@ -49,14 +50,14 @@ const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
 
 describe('phases', () => {
   test('alarms are a sign of life, and no state', () => {
-    const waiting = run(...started.slice(0, 3), { type: 'received', now: 30 }).connection;
+    const waiting = run(...started.slice(0, 3), alarms(30)).connection;
     expect(phaseOf(waiting, 30)).toBe('connecting');
-    const received = step(live, { type: 'received', now: 25 + SILENCE_MS - 1 }).connection;
+    const received = step(live, alarms(25 + SILENCE_MS - 1)).connection;
     expect(phaseOf(received, 25 + SILENCE_MS)).toBe('live');
     expect(phaseOf(live, 25 + SILENCE_MS)).toBe('stale');
     // The page was suspended: this frame may be old too.
-    expect(step(live, { type: 'received', now: 25 + DEAD_MS }).command).toBe('reopen');
-    expect(step(INITIAL, { type: 'received', now: 1 }).connection).toBe(INITIAL);
+    expect(step(live, alarms(25 + DEAD_MS)).command).toBe('reopen');
+    expect(step(INITIAL, alarms(1)).connection).toBe(INITIAL);
   });
 
   test('connecting until the first frame, then live', () => {

@@ -38,19 +38,22 @@ export interface Connection {
 /** All times are ms on the monotonic clock. */
 export type ConnectionEvent =
   | { readonly type: Plain; readonly now: number }
-  /** `status` is null for a state frame. */
-  | { readonly type: 'frame'; readonly now: number; readonly status: StatusFrame | null }
+  /** `status` is null for a state; undefined for a frame that only shows that the bridge is alive. */
+  | {
+      readonly type: 'frame';
+      readonly now: number;
+      readonly status: StatusFrame | null | undefined;
+    }
   | { readonly type: 'closed'; readonly now: number; readonly code: number | null };
 
 /**
  * - start: make a new connection in any state; after a lapse, the old one may deliver old frames
- * - received: a frame other than status and state, which only shows that the bridge is alive
  * - broken: an unusable frame, or a delta that does not fit: later deltas would build on it
  * - wake: the tab became visible, or the operator wants to retry now
  * - online: the network is back; restart a running attempt, which began without it
  * - tick: a deadline of `nextDeadline` may have passed
  */
-export type Plain = 'start' | 'opened' | 'received' | 'broken' | 'wake' | 'online' | 'tick';
+export type Plain = 'start' | 'opened' | 'broken' | 'wake' | 'online' | 'tick';
 
 /** What `socket.ts` must do. "reopen": drop the socket, if any, and make a new one. */
 export type Command = 'reopen' | 'drop' | null;
@@ -80,18 +83,15 @@ export function step(
         status: null,
         socket: { kind: 'open', since: now, lastFrameAt: null, hasState: false },
       });
-    case 'frame':
-    case 'received': {
+    case 'frame': {
       if (socket.kind !== 'open') return stay(connection);
       // The page was suspended: the frame may be old.
       if (silence(socket, now) >= DEAD_MS) return open(connection, now);
-      const received = { ...socket, lastFrameAt: now };
-      if (event.type !== 'frame') return stay({ ...connection, socket: received });
       const { status } = event;
       return stay({
         ...connection,
         status: status ?? connection.status,
-        socket: { ...received, hasState: received.hasState || status === null },
+        socket: { ...socket, lastFrameAt: now, hasState: socket.hasState || status === null },
       });
     }
     case 'closed':

@@ -1,6 +1,5 @@
 import { now } from '../clock';
 import { route } from '../contract/api';
-import type { Parsed } from '../contract/frames';
 import type { StatusFrame } from '../contract/types';
 import {
   type Connection,
@@ -12,7 +11,8 @@ import {
 } from './machine';
 
 export interface ConnectionHandlers<Frame> {
-  readonly parse: (data: unknown) => Parsed<Frame>;
+  /** Throws if a message violates the contract; null: its type is from a later server. */
+  readonly parse: (data: unknown) => Frame | null;
   /** Null for a state frame; undefined for one that only shows that the server is alive. */
   readonly statusOf?: (frame: Frame) => StatusFrame | null | undefined;
   /** The connection changed, or a deadline passed and its phase may have changed. */
@@ -81,18 +81,17 @@ export function connect<Frame>(
     own.onmessage = ({ data }) => {
       const at = look();
       if (at === null) return;
-      const parsed = handlers.parse(data);
-      if (parsed.kind === 'passed over') return;
-      if (parsed.kind === 'bad') {
+      let frame;
+      try {
+        frame = handlers.parse(data);
+      } catch (error) {
         // It may have been a delta.
-        handlers.onBad?.(parsed.why);
+        handlers.onBad?.(String(error));
         send({ type: 'broken', now: at });
         return;
       }
-      const { frame } = parsed;
-      const status = handlers.statusOf?.(frame);
-      if (status === undefined) send({ type: 'received', now: at });
-      else send({ type: 'frame', now: at, status });
+      if (frame === null) return;
+      send({ type: 'frame', now: at, status: handlers.statusOf?.(frame) });
       if (look() === null) return;
       handlers.onFrame(frame, connection);
     };

@@ -133,7 +133,7 @@ function trendOf(now: Reported, then?: Reported | null): number | null {
 function saidOf(alarm: SiteAlarm): readonly string[] {
   const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
   return [
-    ...(by && at != null ? [W.acknowledged(by, timeText(at))] : []),
+    ...(by && at != null ? [S.alarmAcknowledgedBy(by, timeText(at))] : []),
     ...(who && until != null
       ? [S.alarmShelved(timeText(until), alarm.shelved_reason ?? '', who)]
       : []),

@@ -21,10 +21,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void, signal: AbortS
   };
   update({});
   const handlers: ConnectionHandlers<SitesFrame> = {
-    parse: (data) => {
-      const frame = parseSites(data);
-      return frame ? { kind: 'frame', frame } : { kind: 'passed over' };
-    },
+    parse: parseSites,
     onConnection: ({ socket }) => {
       // Nothing is lost before anything came; after sleep or a silence, the attempt may take long to fail.
       const isLost = socket.kind === 'closed' || (socket.kind === 'opening' && seen.archive);

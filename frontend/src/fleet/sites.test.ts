@@ -108,10 +108,11 @@ test('a frame changes what it names, and one that is whole takes the place of al
   expect([...withFrame(second, frame([site('c')])).keys()]).toEqual(['c']);
 });
 
-test.each([[null], [new ArrayBuffer(1)], ['{'], ['{"type":"state"}']])('%j is no frame', (data) => {
-  expect(parseSites(data)).toBeNull();
+test.each([[null], [new ArrayBuffer(1)], ['{']])('%j is no frame', (data) => {
+  expect(() => parseSites(data)).toThrow();
 });
 
-test('a frame of the server is one', () => {
+test('a frame of the server is one, another is passed over', () => {
+  expect(parseSites('{"type":"state"}')).toBeNull();
   expect(parseSites(JSON.stringify(frame([site('a')])))?.sites).toHaveLength(1);
 });

@@ -4,9 +4,9 @@ import { inSeconds } from '../contract/stamps';
 import type { HealthReason, Verdict } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
-import { fleetWordsOf } from '../words/fleet';
+import { FLEET_WORDS } from '../words/fleet';
 
-export const words = fleetWordsOf(LANGUAGE);
+export const words = FLEET_WORDS[LANGUAGE];
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
 interface SiteEntry {
@@ -74,12 +74,8 @@ const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'health
 
 /** null: no frame of the overview. */
 export function parseSites(data: unknown): SitesFrame | null {
-  try {
-    const frame = inSeconds(JSON.parse(String(data))) as SitesFrame | { readonly type: '' };
-    return frame.type === 'sites' ? frame : null;
-  } catch {
-    return null;
-  }
+  const frame = inSeconds(JSON.parse(String(data))) as SitesFrame | { readonly type: '' };
+  return frame.type === 'sites' ? frame : null;
 }
 
 export function withFrame(before: Sites, frame: SitesFrame): Sites {

@@ -12,7 +12,7 @@ export const canvasPoint = (x: number, y: number): CanvasPoint => ({ x, y }) as 
 
 /**
  * Place of the map on the canvas: the map's origin is at (x, y) pixels, one metre is `scale`
- * pixels. The same numbers as a d3-zoom transform over the coordinates (x, -y) in metres.
+ * pixels.
  */
 export interface View {
   readonly x: number;

@@ -4,7 +4,6 @@ import { isClear } from '../geometry/clear';
 import { corners, type MapPoint, mapPoint, toCanvas, type Camera } from '../geometry/coordinates';
 import { act, moveViewport, NO_VIEWPORT, onChange, store, type Viewport } from '../store/app';
 import { MapCamera } from './camera';
-import { startGestures } from './gestures';
 import { started } from '../testing/life';
 
 const size = { width: 600, height: 400 };
@@ -18,7 +17,6 @@ let camera: MapCamera;
 let element: HTMLElement;
 
 beforeEach(() => {
-  startGestures();
   act({ camera: null });
   moveViewport({ ...NO_VIEWPORT, size });
   onView = vi.fn<() => void>();
@@ -174,20 +172,17 @@ describe('camera', () => {
   });
 
   const mouse = (target: EventTarget, type: string, x: number): void => {
-    const event = new MouseEvent(type, { clientX: x, clientY: 0, bubbles: true });
-    // The constructor does not accept it: in a test, `window` is not jsdom's own.
-    Object.defineProperty(event, 'view', { value: window });
-    target.dispatchEvent(event);
+    target.dispatchEvent(new PointerEvent(type, { clientX: x, pointerId: 1 }));
   };
 
   test('nothing that arrives takes the map out of the operator’s hand', () => {
     camera.goTo(null, content);
     const before = viewport().view;
-    mouse(element, 'mousedown', 100);
-    mouse(window, 'mousemove', 140);
+    mouse(element, 'pointerdown', 100);
+    mouse(element, 'pointermove', 140);
     camera.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
     expect(viewport().view).toEqual({ ...before, x: before.x + 40 });
-    mouse(window, 'mouseup', 140);
+    mouse(element, 'pointerup', 140);
     expect(onCamera).toHaveBeenCalledTimes(1);
   });
 
@@ -198,21 +193,46 @@ describe('camera', () => {
     element.dispatchEvent(new WheelEvent('wheel', { deltaY: -240 }));
     const zoomed = viewport().view;
     expect(zoomed.scale).toBeGreaterThan(scale);
-    mouse(element, 'mousedown', 100);
-    // The wheel's gesture ends after a pause, during the drag.
+    mouse(element, 'pointerdown', 100);
+    // The wheel comes to rest during the drag, which goes on.
     vi.runAllTimers();
+    expect(onCamera).not.toHaveBeenCalled();
+    mouse(element, 'pointermove', 140);
+    mouse(element, 'pointerup', 140);
     expect(onCamera).toHaveBeenCalledTimes(1);
-    mouse(window, 'mousemove', 140);
-    mouse(window, 'mouseup', 140);
-    expect(onCamera).toHaveBeenCalledTimes(2);
     expect(viewport().view).toEqual({ ...zoomed, x: zoomed.x + 40 });
     vi.useRealTimers();
   });
 
+  test('two fingers hold what is between them; the end of a drag is no click', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, content);
+    const onClick = vi.fn();
+    element.addEventListener('click', onClick);
+    const finger = (type: string, pointerId: number, clientX: number): void => {
+      element.dispatchEvent(new PointerEvent(type, { pointerId, clientX, clientY: 200 }));
+    };
+    const { scale } = viewport().view;
+    finger('pointerdown', 1, 280);
+    finger('pointerdown', 2, 320);
+    finger('pointermove', 1, 300);
+    finger('pointermove', 2, 380);
+    expect(viewport().view.scale).toBeCloseTo(scale * 2);
+    expect(toCanvas(viewport().view, mapPoint(2, 4)).x).toBeCloseTo(340);
+    finger('pointerup', 1, 300);
+    expect(onCamera).not.toHaveBeenCalled();
+    finger('pointerup', 2, 380);
+    expect(onCamera).toHaveBeenCalledOnce();
+    element.dispatchEvent(new MouseEvent('click'));
+    expect(onClick).not.toHaveBeenCalled();
+    element.dispatchEvent(new MouseEvent('click'));
+    expect(onClick).toHaveBeenCalledOnce();
+  });
+
   test('a click is no choice of a view', () => {
     camera.goTo(null, content);
-    mouse(element, 'mousedown', 100);
-    mouse(window, 'mouseup', 100);
+    mouse(element, 'pointerdown', 100);
+    mouse(element, 'pointermove', 100);
+    mouse(element, 'pointerup', 100);
     expect(onCamera).not.toHaveBeenCalled();
     camera.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
     expect(onView).toHaveBeenCalledTimes(2);
@@ -223,9 +243,9 @@ describe('camera', () => {
     const fixed = new MapCamera(wall, true);
     fixed.goTo(null, content);
     const { view } = viewport();
-    mouse(wall, 'mousedown', 100);
-    mouse(window, 'mousemove', 140);
-    mouse(window, 'mouseup', 140);
+    mouse(wall, 'pointerdown', 100);
+    mouse(wall, 'pointermove', 140);
+    mouse(wall, 'pointerup', 140);
     wall.dispatchEvent(new WheelEvent('wheel', { deltaY: -200 }));
     expect(viewport().view).toEqual(view);
     expect(onCamera).not.toHaveBeenCalled();

@@ -1,4 +1,4 @@
-/** The map's camera and its programmed moves; gestures are in `gestures.ts`. */
+/** The map's camera, moved by the program and by `gestures.ts`. */
 import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
 import { memoOne } from '../domain/memo';
@@ -10,6 +10,8 @@ import {
   type Box,
   type Camera,
   cameraOf,
+  canvasPoint,
+  type CanvasPoint,
   corners,
   inSight,
   type MapPoint,
@@ -21,26 +23,9 @@ import {
   viewOf,
 } from '../geometry/coordinates';
 import { act, moveViewport, store } from '../store/app';
-import { createStore, PAGE } from '../store/create';
+import { PAGE } from '../store/create';
 import type { House } from '../store/twin';
-
-export interface Hand {
-  /** The program moved the map; gestures continue from there. */
-  readonly follow: (view: View) => void;
-  readonly stop: () => void;
-}
-
-export interface Held {
-  readonly leastScale: () => number;
-  readonly inSight: (view: View) => View;
-  readonly onStart: () => void;
-  readonly onEnd: () => void;
-}
-
-type Gestures = (element: HTMLElement, held: Held) => Hand;
-
-/** Null until loaded, right after the first view, which does not need them. */
-export const gestures = createStore<Gestures | null>(null);
+import { watchGestures } from './gestures';
 
 /** A view converted to a camera and back differs in its last digits, and must not move the map. */
 const isSame = (a: View, b: View): boolean =>
@@ -59,7 +44,6 @@ const viewport = () => store.get().viewport;
 
 /** Fits the view, follows links, and executes moves; the store has the result. */
 export class MapCamera {
-  #hand: Hand | null = null;
   /** The view at the start of the current gestures. */
   #held: View | null = null;
   /** What moves must keep in sight; null: not known yet. */
@@ -68,27 +52,21 @@ export class MapCamera {
 
   /** `isFixed`: only the program moves it, not wheel, finger or mouse. */
   constructor(element: HTMLElement, isFixed = false, signal = PAGE) {
-    const take = (): void => {
-      const start = gestures.get();
-      if (isFixed || !start || this.#hand) return;
-      this.#hand = start(element, {
-        leastScale: () => this.#leastScale,
-        inSight: (view) => this.#inSight(view),
-        onStart: () => {
-          // Unchanged if a drag begins before the wheel's gesture has ended.
-          this.#held ??= viewport().view;
-        },
-        onEnd: () => {
-          // A click is a gesture too, but moves nothing.
-          const hasMoved = this.#held !== viewport().view;
-          this.#held = null;
-          if (hasMoved) this.#choose();
-        },
-      });
+    if (isFixed) return;
+    const onStart = (): void => {
+      // Unchanged if a drag begins before the wheel's gesture has ended.
+      this.#held ??= viewport().view;
     };
-    gestures.subscribe(take, signal);
-    signal.addEventListener('abort', () => this.#hand?.stop());
-    take();
+    const onMove = (from: CanvasPoint, to: CanvasPoint, factor: number): void => {
+      this.#show(this.#moved(from, to, factor));
+    };
+    const onEnd = (): void => {
+      // A click is a gesture too, but moves nothing.
+      const hasMoved = this.#held !== viewport().view;
+      this.#held = null;
+      if (hasMoved) this.#choose();
+    };
+    watchGestures(element, { onStart, onMove, onEnd }, signal);
   }
 
   /**
@@ -97,16 +75,15 @@ export class MapCamera {
    */
   goTo(camera: Camera | null, content: Content | null, covered: readonly Box[] = []): void {
     if (this.#held !== null) return;
-    const { view: before, size } = viewport();
+    const { size } = viewport();
     if (size.width === 0 || size.height === 0) return;
     const whole = content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
     if (whole) {
       this.#content = content;
       this.#leastScale = whole.scale / 2;
-      this.#hand?.follow(before);
     }
     const view = camera ? this.#inSight(viewOf(camera, size, this.#leastScale)) : whole;
-    if (view && !isSame(view, before)) this.#move(view);
+    if (view) this.#show(view);
   }
 
   #inSight(view: View): View {
@@ -114,9 +91,17 @@ export class MapCamera {
     return this.#content ? inSight(view, size, this.#content.bounds) : view;
   }
 
-  #move(view: View): void {
-    moveViewport({ view });
-    this.#hand?.follow(view);
+  /** The view in which what is at `from` is at `to`, and `factor` times as large. */
+  #moved(from: CanvasPoint, to: CanvasPoint, factor = 1): View {
+    const { view } = viewport();
+    const scale = Math.min(MAX_SCALE, Math.max(this.#leastScale, view.scale * factor));
+    const by = scale / view.scale;
+    const [x, y] = [to.x + (view.x - from.x) * by, to.y + (view.y - from.y) * by];
+    return this.#inSight({ scale, x, y });
+  }
+
+  #show(view: View): void {
+    if (!isSame(view, viewport().view)) moveViewport({ view });
   }
 
   #choose(): void {
@@ -125,9 +110,7 @@ export class MapCamera {
   }
 
   #step(view: View): void {
-    const before = viewport().view;
-    const within = this.#inSight(view);
-    if (!isSame(within, before)) this.#move(within);
+    this.#show(view);
     if (this.#held === null) this.#choose();
   }
 
@@ -137,28 +120,27 @@ export class MapCamera {
   }
 
   zoomBy(factor: number): void {
-    const { view, size } = viewport();
-    const scale = Math.min(MAX_SCALE, Math.max(this.#leastScale, view.scale * factor));
-    const about = (at: number, length: number): number =>
-      length / 2 + ((at - length / 2) * scale) / view.scale;
-    this.#step({ scale, x: about(view.x, size.width), y: about(view.y, size.height) });
+    const { width, height } = viewport().size;
+    const middle = canvasPoint(width / 2, height / 2);
+    this.#step(this.#moved(middle, middle, factor));
   }
 
   panBy(x: number, y: number): void {
-    const { view, size } = viewport();
-    this.#step({ ...view, x: view.x - x * size.width, y: view.y - y * size.height });
+    const { width, height } = viewport().size;
+    this.#step(this.#moved(canvasPoint(x * width, y * height), canvasPoint(0, 0)));
   }
 
   /** Brings a point into view; if it is well inside the free part, the view stays. */
   show(point: MapPoint, covered: readonly Box[] = []): void {
     const { view, size } = viewport();
-    const { x, y } = toCanvas(view, point);
+    const at = toCanvas(view, point);
+    const { x, y } = at;
     const { width, height } = size;
     // Where everything is shown, a pin at the edge is as far inside as can be.
     const margin = store.get().view.camera === null ? 0 : Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
     if (width === 0 || (isInside && isClear(view, point, covered))) return;
-    this.#step({ ...view, x: view.x + width / 2 - x, y: view.y + height / 2 - y });
+    this.#step(this.#moved(at, canvasPoint(width / 2, height / 2)));
   }
 }
 

@@ -11,7 +11,6 @@ import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { pinUnderMouse, pointedAt } from './commands';
 import { runMap } from './controller';
-import { startGestures } from './gestures';
 
 let element: HTMLElement;
 let still: HTMLCanvasElement;
@@ -47,19 +46,15 @@ const paint = (): void => {
 const view = (): View => store.get().viewport.view;
 const drawn = (name: string): number => FakeContext.recordOf(overlay)?.named(name).length ?? 0;
 
-/** jsdom has no PointerEvent of its own in every version; a mouse event carries all that counts. */
 const pointer = (type: string, x: number, y: number, pointerType = 'mouse'): void => {
-  const event = new MouseEvent(type, { clientX: x, clientY: y, bubbles: true });
-  Object.defineProperty(event, 'pointerType', { value: pointerType });
-  if (pointerType === 'touch') Object.setPrototypeOf(event, PointerEvent.prototype);
-  element.dispatchEvent(event);
+  const at = { clientX: x, clientY: y };
+  element.dispatchEvent(new PointerEvent(type, { ...at, pointerType, bubbles: true }));
 };
 const press = (key: string): void => {
   element.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
 };
 
 beforeEach(() => {
-  startGestures();
   frames = [];
   pointedAt.set(null);
   pinUnderMouse.set(null);

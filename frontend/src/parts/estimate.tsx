@@ -267,7 +267,7 @@ export function AdviceMarks(): JSX.Element {
   }
   if (value.places.length === 0) return <Note text={E.adviceNone} />;
   return (
-    <ol className="advice" aria-label={E.advice} data-testid="advice">
+    <ol className="advice" aria-label={S.layers.advice} data-testid="advice">
       {value.places.map((place, index) => (
         <Mark key={index} place={place} number={index + 1} />
       ))}

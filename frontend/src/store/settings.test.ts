@@ -3,9 +3,10 @@ import { expect, test, vi } from 'vitest';
 import {
   DEFAULT_SETTINGS,
   isColumnShown,
-  keepSettings,
+  keepStored,
   openStorage,
   readSettings,
+  SETTINGS_KEY,
   withColumn,
 } from './settings';
 
@@ -22,8 +23,10 @@ test('what was kept comes back', () => {
     hidden: ['pest', 'co2'],
     byArea: true,
     dayBefore: true,
+    sound: true,
+    notify: true,
   } as const;
-  keepSettings({ setItem: (_, value) => (stored = value) }, settings);
+  keepStored({ setItem: (_, value) => (stored = value) }, SETTINGS_KEY, settings);
   expect(readSettings(storage(stored))).toEqual(settings);
 });
 
@@ -47,7 +50,7 @@ test('a forbidden storage keeps nothing and does no harm', () => {
     throw new Error('SecurityError');
   });
   const storage = openStorage();
-  keepSettings(storage, DEFAULT_SETTINGS);
+  keepStored(storage, SETTINGS_KEY, DEFAULT_SETTINGS);
   expect(readSettings(storage)).toEqual(DEFAULT_SETTINGS);
 });
 
@@ -58,6 +61,6 @@ test('a full storage does no harm', () => {
     },
   };
   expect(() => {
-    keepSettings(full, DEFAULT_SETTINGS);
+    keepStored(full, SETTINGS_KEY, DEFAULT_SETTINGS);
   }).not.toThrow();
 });

@@ -11,6 +11,9 @@ export interface Settings {
   /** Whether the table's rows are grouped by area, if there are areas. */
   readonly byArea: boolean;
   readonly dayBefore: boolean;
+  /** Whether new alarms are heard, and shown while nobody looks at the page. */
+  readonly sound: boolean;
+  readonly notify: boolean;
 }
 
 export const DEFAULT_SETTINGS: Settings = {
@@ -20,6 +23,8 @@ export const DEFAULT_SETTINGS: Settings = {
   hidden: [],
   byArea: false,
   dayBefore: false,
+  sound: false,
+  notify: false,
 };
 
 /** The tag's own column is always shown. */
@@ -33,12 +38,12 @@ export const withColumn = (
 ): readonly string[] =>
   on || id === 'tag' ? hidden.filter((each) => each !== id) : [...new Set([...hidden, id])];
 
-const KEY = 'lupin-twin.settings';
+export const SETTINGS_KEY = 'lupin-twin.settings';
 
 /** Reads the stored settings; missing or damaged ones get their defaults. */
 export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
   try {
-    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
+    const stored = JSON.parse(storage.getItem(SETTINGS_KEY) ?? '{}') as Partial<Settings>;
     // A stored value that is no list would crash the page on every load.
     const hidden = Array.isArray(stored.hidden) ? stored.hidden : [];
     return { ...DEFAULT_SETTINGS, ...stored, hidden };
@@ -56,10 +61,10 @@ export function openStorage(): Pick<Storage, 'getItem' | 'setItem'> {
   }
 }
 
-export function keepSettings(storage: Pick<Storage, 'setItem'>, settings: Settings): void {
+export function keepStored(storage: Pick<Storage, 'setItem'>, key: string, value: object): void {
   try {
-    storage.setItem(KEY, JSON.stringify(settings));
+    storage.setItem(key, JSON.stringify(value));
   } catch {
-    // Storage is full or blocked: the settings then last as long as the page.
+    // Storage is full or blocked: the value then lasts as long as the page.
   }
 }

@@ -74,16 +74,11 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
               : S.differenceLoading}
         </p>
       )}
-      {range && value && <p className="faint">{timesText(value)}</p>}
+      {range && value && (
+        <p className="faint">
+          {S.differenceTimes(shortRosText(value.at), shortRosText(value.against))}
+        </p>
+      )}
     </div>
   );
 }
-
-/** Both moments on one line of a phone: the year only where it differs. */
-function timesText({ at, against }: { at: number; against: number }): string {
-  const isSameYear = yearOf(at) === yearOf(against);
-  const text = isSameYear ? shortRosText : rosText;
-  return S.differenceTimes(text(at), text(against));
-}
-
-const yearOf = (at: number): number => new Date(at * 1000).getFullYear();

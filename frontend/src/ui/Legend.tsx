@@ -222,13 +222,13 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   );
   return (
     <div className="ideal-scale" data-testid="ideal-scale" title={species}>
-      {step('low', low ? S.tooLow(null) : '', low ? S.legendBelow(low) : S.below)}
+      {step('low', low ? S.tooLow(null) : '', low ? S.legendBelow(low) : S.tooLow(null))}
       {step(
         'right',
         species === '' ? part : S.legendEach(part),
         species === '' && ideal && rangeText(sensor, ideal),
       )}
-      {step('high', high ? S.tooHigh(null) : '', high ? S.legendAbove(high) : S.above)}
+      {step('high', high ? S.tooHigh(null) : '', high ? S.legendAbove(high) : S.tooHigh(null))}
     </div>
   );
 }

@@ -1,17 +1,17 @@
 import type { JSX } from 'react';
 
-import { DAY_S, differenceText, type Compare } from '../domain/difference';
+import { differenceText } from '../domain/difference';
 import { cellAt, valueAt } from '../domain/field';
 import { metresText, readingText, written } from '../domain/format';
 import { idealText, rangesAt } from '../domain/ideal';
-import { rosText } from '../domain/time';
+import { shortRosText } from '../domain/time';
 import { lengthText, scaleBar } from '../geometry/coordinates';
 import { pointedAt, theMap } from '../map/commands';
 import { MapView } from '../map/MapView';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHeat, selectSensor, selectZones } from '../store/derived';
-import { selectDayS, selectShown } from '../store/moment';
+import { selectShown } from '../store/moment';
 import { LAYERS, withLayer } from '../store/view';
 import { S } from '../strings';
 import { PastFrame } from '../timebar/Past';
@@ -103,7 +103,6 @@ function LayerList(): JSX.Element {
 export function Readout(): JSX.Element | null {
   const point = useSelected(pointedAt);
   const heat = useApp(selectHeat);
-  const compare = useApp((state) => (selectDayS(state) === DAY_S ? state.view.compare : null));
   const sensor = useApp(selectSensor);
   const difference = heat?.difference;
   const value = point && heat ? valueAt(heat.field, point) : null;
@@ -124,7 +123,7 @@ export function Readout(): JSX.Element | null {
         <strong>
           {value === null ? S.notKnown : text(sensor, value)}
           {difference && value !== null && (
-            <span> {sinceText(rosText(difference.against), compare)}</span>
+            <span> {S.differenceSince(shortRosText(difference.against))}</span>
           )}
         </strong>
       )}
@@ -133,13 +132,6 @@ export function Readout(): JSX.Element | null {
       <span>{S.position(metresText(point.x), metresText(point.y))}</span>
     </output>
   );
-}
-
-/** What a difference is relative to; for a real day or week ago, the time of day is enough. */
-function sinceText(against: string, compare: Compare | null): string {
-  const clock = against.slice(-8, -3);
-  if (compare === 'day') return S.differenceSinceYesterday(clock);
-  return compare === 'week' ? S.differenceSinceWeek(clock) : S.differenceSince(against);
 }
 
 const LONGEST_BAR_PX = 110;

@@ -1,6 +1,6 @@
 import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
-import { differenceShown, trendOf } from '../domain/difference';
+import { trendOf } from '../domain/difference';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import {
   beyondText,
@@ -22,7 +22,7 @@ import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Age, FailedAttemptText, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
-import { ARROWS } from './Trend';
+import { Trend } from './Trend';
 
 /** What all rows have in common. */
 export interface RowLook {
@@ -222,7 +222,6 @@ function TrendLine({ sensor, row, look: { then } }: CellProps): JSX.Element | nu
   const value = tag.readings.get(sensor.name);
   const trend = trendOf(sensor.name, row, thenOf(then, tag));
   if (!trend || value == null) return null;
-  const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
   if (!then || trend.kind !== 'by') {
     if (then && trend.kind === 'same')
       return (
@@ -233,11 +232,5 @@ function TrendLine({ sensor, row, look: { then } }: CellProps): JSX.Element | nu
     // For screen readers only: with a short history, every row would show it.
     return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
-  const { way, text, rate } = differenceShown(sensor, trend.by);
-  return (
-    <span className="trend" data-trend={way} title={`${title}: ${text}`}>
-      <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>
-      {rate}
-    </span>
-  );
+  return <Trend className="trend" sensor={sensor} by={trend.by} hour={shortHourText()} />;
 }

@@ -220,7 +220,7 @@ describe('table', () => {
     };
     hourBefore();
     expect(trends()).toEqual([
-      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C/h',
+      '\u2197 +1.5\u00a0°C/h Temperature compared with an hour ago: +1.5\u00a0°C',
       'no reading an hour ago',
     ]);
     // With shortened days, an hour is not a clock hour.

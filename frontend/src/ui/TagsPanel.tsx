@@ -5,7 +5,7 @@ import { selectRows } from '../store/derived';
 import { selectHasSnapshot, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { Disclosure, Icon } from '../widgets/controls';
-import { FILTER_ID, ListChoice, SearchField } from './alarms/ListChoice';
+import { CsvButton, FILTER_ID, ListChoice, SearchField } from './alarms/ListChoice';
 import { HealthSummary } from './HealthSummary';
 import { loadParts, WithParts } from './loadDeferred';
 import { EmptyTable } from './Notices';
@@ -95,9 +95,7 @@ function FilterBar(): JSX.Element {
         {hasSnapshot && S.shownOf(count, all)}
         {status && ` · ${S.health[status]}`}
       </span>
-      <button type="button" className="text-button" title={S.saveCsv} onClick={saveTable}>
-        <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
-      </button>
+      <CsvButton title={S.saveCsv} save={saveTable} />
       <Disclosure label={S.tableButton} button={<Icon name="columns" />} className="table-settings">
         <WithParts>{(parts) => <parts.TableChoices />}</WithParts>
       </Disclosure>

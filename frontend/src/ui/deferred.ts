@@ -17,7 +17,6 @@ import '../styles/print.css';
 
 export { startBadge, startNotify, startSound } from '../alarms/notify';
 export { saveTable } from '../export/actions';
-export { startGestures } from '../map/gestures';
 export { startNotes } from '../notes/NoteMarks';
 export { startDifference } from '../store/difference';
 export { startOpening, startRemembered } from '../store/remembered';

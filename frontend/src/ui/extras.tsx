@@ -1,4 +1,4 @@
-/** Parts loaded after the first view, on the map, in its legend and layers; the robot's only if there is one. */
+/** Parts loaded after the first view: on the map, in its legend and layers; the robot's only if there is one. */
 import { useLayoutEffect, useMemo, useRef, type JSX, type ReactNode } from 'react';
 
 import { readingText, shortAgeText } from '../domain/format';
@@ -12,7 +12,7 @@ import type { Tag } from '../domain/twin';
 import { speciesOf } from '../draw/scene';
 import { beside } from '../geometry/clear';
 import { pinUnderMouse, type PinUnderMouse } from '../map/commands';
-import type * as RobotParts from '../parts/robot';
+import { RobotChoice, RobotFact, RobotLayer } from '../parts/robot';
 import { useApp } from '../store/app';
 import { robotFrame, useSelected } from '../store/create';
 import { selectCatalogue, selectHealth } from '../store/derived';
@@ -21,13 +21,7 @@ import { S } from '../strings';
 import { Age, AgeFact } from './Age';
 import { Meanwhile } from './alarms/AlarmNotes';
 import { HealthMark, HealthShape } from './HealthMark';
-import { lazyPart } from './lazyParts';
 import { Reasons } from './Reasons';
-
-const robot = (): Promise<typeof RobotParts> => import('../parts/robot');
-const RobotLayer = lazyPart(async () => (await robot()).RobotLayer);
-const RobotFact = lazyPart(async () => (await robot()).RobotFact);
-const RobotChoice = lazyPart(async () => (await robot()).RobotChoice);
 
 const useHasRobot = (): boolean => useSelected(robotFrame, (frame) => frame !== null);
 

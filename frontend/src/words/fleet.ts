@@ -112,13 +112,9 @@ const SPANISH: FleetWords = {
   shown: (count, all) => `${count} de ${all} invernaderos mostrados`,
 };
 
-const WORDS: Readonly<Record<Language, FleetWords>> = {
+export const FLEET_WORDS: Readonly<Record<Language, FleetWords>> = {
   en: ENGLISH,
   de: GERMAN,
   nl: DUTCH,
   es: SPANISH,
 };
-
-export function fleetWordsOf(language: Language): FleetWords {
-  return WORDS[language];
-}

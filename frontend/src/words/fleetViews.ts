@@ -4,7 +4,6 @@ import type { In } from './shape';
 
 const ENGLISH = {
   wasLive: 'last known',
-  acknowledged: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
   moreAlarms: (count: number): string => `${count} more: see the pages of the greenhouses.`,
   deviation: 'Deviation',
   deviationHint: 'How far a greenhouse is from the median of all, on average.',
@@ -28,7 +27,6 @@ const ENGLISH = {
 
 const GERMAN: In<typeof ENGLISH> = {
   wasLive: 'zuletzt bekannt',
-  acknowledged: (name, at) => `quittiert von ${name}, ${at}`,
   moreAlarms: (count) => `${count} weitere: siehe die Seiten der Gewächshäuser.`,
   deviation: 'Abweichung',
   deviationHint: 'Wie weit ein Gewächshaus im Mittel vom Median aller Gewächshäuser abweicht.',
@@ -52,7 +50,6 @@ const GERMAN: In<typeof ENGLISH> = {
 
 const DUTCH: In<typeof ENGLISH> = {
   wasLive: 'laatst bekend',
-  acknowledged: (name, at) => `bevestigd door ${name}, ${at}`,
   moreAlarms: (count) => `Nog ${count}: zie de pagina’s van de kassen.`,
   deviation: 'Afwijking',
   deviationHint: 'Hoe ver een kas gemiddeld van de mediaan van alle kassen ligt.',
@@ -76,7 +73,6 @@ const DUTCH: In<typeof ENGLISH> = {
 
 const SPANISH: In<typeof ENGLISH> = {
   wasLive: 'últimos datos',
-  acknowledged: (name, at) => `reconocida por ${name}, ${at}`,
   moreAlarms: (count) => `${count} más: vea las páginas de los invernaderos.`,
   deviation: 'Desviación',
   deviationHint: 'Cuánto se aleja un invernadero de la mediana de todos, en promedio.',

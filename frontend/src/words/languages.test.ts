@@ -6,21 +6,21 @@ import { expect, test } from 'vitest';
 import { chosenLanguage, LANGUAGE_NAMES, LANGUAGES } from './languages';
 
 test.each([
-  ['', ['de-AT', 'en'], { language: 'de', locale: 'de-AT', unknown: null }],
-  ['', ['nl'], { language: 'nl', locale: 'nl-NL', unknown: null }],
+  ['', ['de-AT', 'en'], { language: 'de', locale: 'de-AT' }],
+  ['', ['nl'], { language: 'nl', locale: 'nl-NL' }],
   // The first supported language, not the first one listed.
-  ['', ['fr-FR', 'es-MX', 'de'], { language: 'es', locale: 'es-MX', unknown: null }],
-  ['', ['fr', 'pl'], { language: 'en', locale: 'en-GB', unknown: null }],
-  ['', [], { language: 'en', locale: 'en-GB', unknown: null }],
-  ['?lang=nl', ['de-DE'], { language: 'nl', locale: 'nl-NL', unknown: null }],
-  ['?lang=DE-ch', ['en-US'], { language: 'de', locale: 'de-CH', unknown: null }],
-  ['?kiosk=1&lang=de', ['fr', 'de-CH'], { language: 'de', locale: 'de-CH', unknown: null }],
+  ['', ['fr-FR', 'es-MX', 'de'], { language: 'es', locale: 'es-MX' }],
+  ['', ['fr', 'pl'], { language: 'en', locale: 'en-GB' }],
+  ['', [], { language: 'en', locale: 'en-GB' }],
+  ['?lang=nl', ['de-DE'], { language: 'nl', locale: 'nl-NL' }],
+  ['?lang=DE-ch', ['en-US'], { language: 'de', locale: 'de-CH' }],
+  ['?kiosk=1&lang=de', ['fr', 'de-CH'], { language: 'de', locale: 'de-CH' }],
   // English dates have one format, whatever the region.
-  ['?lang=en-US', ['de'], { language: 'en', locale: 'en-GB', unknown: null }],
-  // An unsupported ?lang= is reported; the browser's language does not replace it.
-  ['?lang=xx', ['de'], { language: 'en', locale: 'en-GB', unknown: 'xx' }],
-  ['?lang=', ['de'], { language: 'en', locale: 'en-GB', unknown: '' }],
-  ['?lang=de-!', [], { language: 'de', locale: 'de-DE', unknown: null }],
+  ['?lang=en-US', ['de'], { language: 'en', locale: 'en-GB' }],
+  // The browser's language does not replace an unsupported ?lang=.
+  ['?lang=xx', ['de'], { language: 'en', locale: 'en-GB' }],
+  ['?lang=', ['de'], { language: 'en', locale: 'en-GB' }],
+  ['?lang=de-!', [], { language: 'de', locale: 'de-DE' }],
 ])('“%s” and a browser that prefers %j: %j', (search, preferred, choice) => {
   expect(chosenLanguage(search, preferred)).toEqual(choice);
 });

@@ -27,21 +27,14 @@ export interface Choice {
   readonly language: Language;
   /** For `Intl`: the language, with the region if known. */
   readonly locale: string;
-  /** The unsupported value of `?lang=`; null: none. */
-  readonly unknown: string | null;
 }
 
 /** The language of `?lang=`, else the browser's first supported language, else English. */
 export function chosenLanguage(search: string, preferred: readonly string[]): Choice {
   const requested = new URLSearchParams(search).get('lang');
-  const spoken = requested === null ? null : languageOf(requested);
-  const own = requested === null ? preferred.map(languageOf).find((each) => each !== null) : spoken;
-  const language = own ?? 'en';
-  return {
-    language,
-    locale: localeFor(language, requested === null ? preferred : [requested, ...preferred]),
-    unknown: spoken === null ? requested : null,
-  };
+  const wanted = requested === null ? preferred : [requested];
+  const language = wanted.map(languageOf).find((each) => each !== null) ?? 'en';
+  return { language, locale: localeFor(language, [...wanted, ...preferred]) };
 }
 
 /** "de-AT" and "DE" are German; null: not supported. */

@@ -9,7 +9,6 @@ export const NOTES = {
       `Signed in as ${name} (viewer): you see alarms, but cannot acknowledge or shelve them.`,
     elsewhere: (name: string): string =>
       `Signed in as ${name}: this server stores no notes, so you cannot acknowledge or shelve alarms here.`,
-    acknowledged: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
     failed: (why: string): string => `Not saved: ${why}`,
     title: 'Comments',
     comment: 'Comment',
@@ -28,7 +27,6 @@ export const NOTES = {
       `Angemeldet als ${name}, nur lesend: Alarme lassen sich ansehen, aber nicht quittieren oder zurückstellen.`,
     elsewhere: (name: string): string =>
       `Angemeldet als ${name}: Dieser Server speichert keine Notizen; Alarme lassen sich hier nicht quittieren oder zurückstellen.`,
-    acknowledged: (name: string, at: string): string => `quittiert von ${name}, ${at}`,
     failed: (why: string): string => `Nicht gespeichert: ${why}`,
     title: 'Kommentare',
     comment: 'Kommentieren',
@@ -47,7 +45,6 @@ export const NOTES = {
       `Aangemeld als ${name} (alleen lezen): u ziet alarmen, maar kunt ze niet bevestigen of uitstellen.`,
     elsewhere: (name: string): string =>
       `Aangemeld als ${name}: deze server slaat geen notities op; u kunt hier geen alarmen bevestigen of uitstellen.`,
-    acknowledged: (name: string, at: string): string => `bevestigd door ${name}, ${at}`,
     failed: (why: string): string => `Niet opgeslagen: ${why}`,
     title: 'Opmerkingen',
     comment: 'Opmerking',
@@ -66,7 +63,6 @@ export const NOTES = {
       `Sesión iniciada como ${name}, solo lectura: ve las alarmas, pero no puede reconocerlas ni aplazarlas.`,
     elsewhere: (name: string): string =>
       `Sesión iniciada como ${name}: este servidor no guarda notas; aquí no puede reconocer ni aplazar alarmas.`,
-    acknowledged: (name: string, at: string): string => `reconocida por ${name}, ${at}`,
     failed: (why: string): string => `No se ha guardado: ${why}`,
     title: 'Comentarios',
     comment: 'Comentar',

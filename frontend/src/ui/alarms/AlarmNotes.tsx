@@ -2,7 +2,7 @@ import { useId, useMemo, type JSX, type ReactNode } from 'react';
 
 import { alarmOf, isAwaited } from '../../alarms/list';
 import { isPushed, notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
-import { lastAction, own, undo } from '../../alarms/own';
+import { lastAction, undo } from '../../alarms/own';
 import { severalNow } from '../../alarms/latest';
 import { alarmList, dismissMeanwhile, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
@@ -136,7 +136,7 @@ export function LastActionLine({
 
 /** Opt-in sound and notifications for alarms while nobody is looking at the page. */
 export function NotifySettings(): JSX.Element {
-  const local = useSelected(own);
+  const settings = useApp((state) => state.settings);
   const sound = useSelected(soundState);
   const notify = useSelected(notifyState);
   const isPossible = notify === 'granted' || notify === 'prompt';
@@ -145,15 +145,15 @@ export function NotifySettings(): JSX.Element {
     <>
       <Way
         label={S.alarmSound}
-        isOn={local.sound && sound !== 'none'}
+        isOn={settings.sound && sound !== 'none'}
         isPossible={sound !== 'none'}
         // While sound is off, "waits" does not apply.
-        hint={S.alarmSoundHints[local.sound || sound === 'none' ? sound : 'ready']}
+        hint={S.alarmSoundHints[settings.sound || sound === 'none' ? sound : 'ready']}
         onChange={setSound}
       />
       <Way
         label={S.alarmNotify}
-        isOn={local.notify && notify === 'granted'}
+        isOn={settings.notify && notify === 'granted'}
         isPossible={isPossible}
         hint={isPossible ? S.alarmNotifyHint + also : S.alarmNotifyNot[notify]}
         onChange={setNotify}

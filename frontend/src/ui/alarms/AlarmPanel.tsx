@@ -15,7 +15,7 @@ import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
 import { saveCsv } from '../../export/save';
 import { store, useApp, useContent } from '../../store/app';
-import { mayAct, person, useSelected } from '../../store/create';
+import { person, useSelected } from '../../store/create';
 import { selectCatalogue } from '../../store/derived';
 import { selectLatestTag } from '../../store/moment';
 import { S } from '../../strings';
@@ -25,8 +25,8 @@ import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmN
 import { AlarmRow } from './AlarmRow';
 import { ignoreDoubleClick } from './AlarmTools';
 import { CauseHeading } from './CauseHeading';
-import { ALARMS_ID, ListChoice, SearchField } from './ListChoice';
-import { sharingText, useIsRefused } from './people';
+import { ALARMS_ID, CsvButton, ListChoice, SearchField } from './ListChoice';
+import { sharingText, useActing } from './people';
 
 /** Rows shown at first, and with each "more". */
 const MOST_ROWS = 100;
@@ -47,7 +47,7 @@ export function AlarmPanel(): JSX.Element {
   const counted = filtered(all, filter, sensors, isTag);
   const waiting = calling(seen);
   const who = useSelected(person);
-  const isRefused = useIsRefused();
+  const { isAble, isRefused } = useActing();
   const count = seen.active.length + seen.shelved.length + seen.resolved.length;
   const list = useRef<HTMLDivElement>(null);
   useChosenInSight(
@@ -74,21 +74,17 @@ export function AlarmPanel(): JSX.Element {
           text={(each) => S.alarmOrders[each]}
           onChange={setOrder}
         />
-        <button
-          type="button"
-          className="text-button"
+        <CsvButton
           title={S.alarmSaveCsv}
-          onClick={() => {
+          save={() => {
             const found = filtered(alarmList.get(), filter, sensors, isTag);
             const text = alarmsCsv(found, sensors, (alarm) => selectNow(store.get(), alarm));
             saveCsv('alarms', text, timeOfDay());
           }}
-        >
-          <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
-        </button>
+        />
       </div>
       <LastActionLine added={added.length} onShow={showNew}>
-        {mayAct(who) && (
+        {isAble && (
           <button
             type="button"
             className="text-button acknowledge-all"

@@ -15,10 +15,10 @@ import { ageText } from '../../domain/format';
 import { VERDICTS } from '../../domain/health';
 import { CommentField } from '../../notes/Comments';
 import { C } from '../../notes/NoteMarks';
-import { mayAct, mayWithdraw, person, useSelected } from '../../store/create';
+import { mayWithdraw, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
-import { useIsRefused } from './people';
+import { useActing } from './people';
 
 /** What an operator can do about an alarm, or about all of a heading. */
 export function AlarmTools({
@@ -34,8 +34,7 @@ export function AlarmTools({
   /** What was done, in the button's place, so that nothing moves; null: not yet. Empty: neither. */
   status: string | null;
 }): JSX.Element {
-  const isAble = useSelected(person, mayAct);
-  const isRefused = useIsRefused();
+  const { isAble, isRefused } = useActing();
   const label = S.alarmWhat(S.alarmAcknowledge, name);
   return (
     <div className="alarm-tools">
@@ -78,7 +77,7 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person);
-  const isRefused = useIsRefused();
+  const { isAble, isRefused } = useActing();
   useLayoutEffect(() => {
     root.current?.scrollIntoView({ block: 'nearest' });
   }, [form]);
@@ -101,7 +100,7 @@ function Actions({ items, name }: { items: readonly Item[]; name: string }): JSX
     some: readonly Item[],
     action: (some: readonly Item[]) => void,
   ): JSX.Element | false =>
-    mayAct(who) && some.length > 0 && act(allText(text, some, items), () => action(some));
+    isAble && some.length > 0 && act(allText(text, some, items), () => action(some));
   const then = (action: (some: readonly Item[]) => void) => (some: readonly Item[]) => {
     close();
     action(some);

@@ -7,13 +7,13 @@ import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import { minuteText } from '../../domain/format';
 import { store, useApp } from '../../store/app';
-import { mayAct, person, useSelected } from '../../store/create';
+import { useSelected } from '../../store/create';
 import { selectCatalogue } from '../../store/derived';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { ignoreDoubleClick } from './AlarmTools';
-import { useIsRefused, useWhoAcknowledged } from './people';
+import { useActing, useWhoAcknowledged } from './people';
 
 /** A tag's alarms on its card: active since when, or shelved until when. */
 export function CardAlarms({ tagId }: { tagId: string }): JSX.Element {
@@ -36,8 +36,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
   const well = useApp((state) =>
     worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',
   );
-  const isAble = useSelected(person, mayAct);
-  const isRefused = useIsRefused();
+  const { isAble, isRefused } = useActing();
   if (items.length === 0) return null;
   return (
     <div className="card-alarms" data-testid="card-alarms">
@@ -73,8 +72,7 @@ function Acknowledged({ items }: { items: readonly Item[] }): JSX.Element {
 function Shelved({ tagId }: { tagId: string }): JSX.Element {
   const shelved = useSelected(alarmList, (list) => list.shelved);
   const sensors = useApp(selectCatalogue);
-  const isAble = useSelected(person, mayAct);
-  const isRefused = useIsRefused();
+  const { isAble, isRefused } = useActing();
   return (
     <>
       {shelved.map(

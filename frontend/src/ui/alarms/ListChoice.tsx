@@ -54,6 +54,13 @@ export function SearchField({
   );
 }
 
+/** Saves a list as CSV. */
+export const CsvButton = ({ title, save }: { title: string; save: () => void }): JSX.Element => (
+  <button type="button" className="text-button" title={title} onClick={save}>
+    <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
+  </button>
+);
+
 /** Chooses the list beside the map; a narrow screen has tabs at its foot instead. */
 export function ListChoice(): JSX.Element {
   const list = useApp((state) => state.view.list);

@@ -10,7 +10,7 @@ import { failureText } from '../../domain/format';
 import { shown } from '../../domain/text';
 import { keepFetched, onChange, store, useApp } from '../../store/app';
 import { rosNow, selectIsDisconnected } from '../../store/moment';
-import { PAGE, person, useSelected } from '../../store/create';
+import { mayAct, PAGE, person, useSelected } from '../../store/create';
 import { say } from '../toast';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -162,10 +162,11 @@ export function startPeople(signal = PAGE): void {
   });
 }
 
-/** Whether actions would be refused: they are shared, and the bridge does not answer. */
-export function useIsRefused(): boolean {
-  const isShared = useSelected(person, (who) => who?.can_write_notes === true);
-  return useApp(selectIsDisconnected) && isShared;
+/** Whether the user may act on alarms; refused: actions are shared, and the bridge does not answer. */
+export function useActing(): { readonly isAble: boolean; readonly isRefused: boolean } {
+  const who = useSelected(person);
+  const isRefused = useApp(selectIsDisconnected) && who?.can_write_notes === true;
+  return { isAble: mayAct(who), isRefused };
 }
 
 /** Says whether actions stay in this browser or are shared. */
@@ -180,5 +181,5 @@ export function useWhoAcknowledged(alarm: Alarm | null): string | null {
   const name = alarm?.acknowledged_by;
   const at = alarm?.acknowledged_at;
   const when = useTicking((tick) => (at == null ? '' : whenText(at, rosNow(store.get(), tick))));
-  return name && when !== '' ? C.acknowledged(name, when) : null;
+  return name && when !== '' ? S.alarmAcknowledgedBy(name, when) : null;
 }

@@ -47,6 +47,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmAcknowledge: 'Quittieren',
   alarmAll: (what, count) =>
     what.includes(' ') ? `${what}: alle (${count})` : `Alle ${what.toLowerCase()} (${count})`,
+  alarmAcknowledgedBy: (name, at) => `quittiert von ${name}, ${at}`,
   alarmUnacknowledge: 'Quittierung aufheben',
   alarmShelve: 'Zurückstellen',
   alarmShelveHint: 'Bis dahin keine Meldung, außer es wird schlimmer.',
@@ -233,6 +234,4 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'zu tief' : `um ${by} zu tief`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
   side: { below: 'tief', above: 'hoch' },
-  below: 'zu tief',
-  above: 'zu hoch',
 };

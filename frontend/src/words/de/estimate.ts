@@ -28,7 +28,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   oldest: (age) => `ältester Messwert vor ${age}`,
   expected: (measured, expected) => `gemessen ${measured}, erwartet ${expected}`,
   leftOut: (sensor) => `${sensor}: möglicher Sensorfehler, nicht in der Schätzung`,
-  advice: 'Vorschläge für Messpunkte',
   advised: (place, percent, isFirst) =>
     isFirst
       ? `${place}: Ein Messpunkt hier senkt den Fehler der Karte auf ${percent} des heutigen`

@@ -86,8 +86,6 @@ export const MAP: In<typeof EN.MAP> = {
   differenceNothing: (at) => `Keine Daten für ${at}.`,
   differenceFailed: (reason) => `Kein Unterschied: ${reason}`,
   differenceTimes: (at, against) => `${at} verglichen mit ${against}`,
-  differenceSinceYesterday: (clock) => `gegenüber gestern ${clock}`,
-  differenceSinceWeek: (clock) => `gegenüber vor einer Woche, ${clock}`,
   differenceSince: (moment) => `gegenüber ${moment}`,
 
   robotLayer: 'Roboter',

@@ -10,8 +10,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   more: 'Mehr dazu',
 
   language: 'Sprache',
-  languageUnknown: (asked) =>
-    `Diese Seite gibt es nicht auf „${asked}“. Sie wird auf Englisch angezeigt.`,
   languageMissing: (name) =>
     `${name} konnte nicht geladen werden: Die Seite wird auf Englisch angezeigt.`,
   partsLate: 'Ein Teil der Seite ist nicht geladen.',

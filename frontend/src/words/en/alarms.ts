@@ -46,6 +46,7 @@ export const ALARMS = {
   alarmAcknowledge: 'Acknowledge',
   /** An action on several alarms at once. */
   alarmAll: (what: string, count: number): string => `${what} all (${count})`,
+  alarmAcknowledgedBy: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
   alarmUnacknowledge: 'Unacknowledge',
   alarmShelve: 'Shelve',
   alarmShelveHint: 'No notification until the time is up, unless it gets worse.',
@@ -247,6 +248,4 @@ export const HEALTH = {
   tooHigh: (by: string | null): string => (by === null ? 'too high' : `too high by ${by}`),
   /** Before a value beyond its limit: short, in a narrow column. */
   side: { below: 'low', above: 'high' },
-  below: 'too low',
-  above: 'too high',
 } as const;

@@ -27,7 +27,6 @@ export const ESTIMATE = {
   expected: (measured: string, expected: string): string =>
     `measured ${measured}, expected ${expected}`,
   leftOut: (sensor: string): string => `${sensor}: possible sensor fault, not used in the estimate`,
-  advice: 'Suggested tag positions',
   advised: (place: string, percent: string, isFirst: boolean): string =>
     isFirst
       ? `${place}: a tag here reduces the map’s error to ${percent} of its current value`

@@ -82,8 +82,6 @@ export const MAP = {
   differenceNothing: (at: string): string => `No data for ${at}.`,
   differenceFailed: (reason: string): string => `No difference: ${reason}`,
   differenceTimes: (at: string, against: string): string => `${at} compared with ${against}`,
-  differenceSinceYesterday: (clock: string): string => `since yesterday ${clock}`,
-  differenceSinceWeek: (clock: string): string => `since ${clock} a week ago`,
   differenceSince: (moment: string): string => `since ${moment}`,
 
   robotLayer: 'Robot',

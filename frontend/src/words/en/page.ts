@@ -8,8 +8,6 @@ export const PAGE = {
   more: 'More about this',
 
   language: 'Language',
-  languageUnknown: (asked: string): string =>
-    `This page is not available in “${asked}”. It is shown in English.`,
   languageMissing: (name: string): string =>
     `${name} could not be loaded. The page is shown in English.`,
   partsLate: 'Part of the page has not loaded.',

@@ -43,6 +43,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmActionsOf: (what) => `Acciones: ${what}`,
   alarmAcknowledge: 'Reconocer',
   alarmAll: (what, count) => `${what}${what.includes(' ') ? ':' : ''} todas (${count})`,
+  alarmAcknowledgedBy: (name, at) => `reconocida por ${name}, ${at}`,
   alarmUnacknowledge: 'Anular reconocimiento',
   alarmShelve: 'Aplazar',
   alarmShelveHint: 'Sin avisos hasta entonces, salvo que empeore.',
@@ -240,6 +241,4 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'bajo el mínimo' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'sobre el máximo' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
-  below: 'por debajo',
-  above: 'por encima',
 };

@@ -26,7 +26,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   oldest: (age) => `lectura más antigua hace ${age}`,
   expected: (measured, expected) => `medido ${measured}, esperado ${expected}`,
   leftOut: (sensor) => `${sensor}: posible fallo del sensor, no se usa en la estimación`,
-  advice: 'Puntos propuestos',
   advised: (place, percent, isFirst) =>
     isFirst
       ? `${place}: un punto aquí reduce el error del mapa al ${percent} del actual`

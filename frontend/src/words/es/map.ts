@@ -85,8 +85,6 @@ export const MAP: In<typeof EN.MAP> = {
   differenceNothing: (at) => `Sin datos de ${at}.`,
   differenceFailed: (reason) => `Sin diferencia: ${reason}`,
   differenceTimes: (at, against) => `${at} en comparación con ${against}`,
-  differenceSinceYesterday: (clock) => `respecto a ayer a las ${clock}`,
-  differenceSinceWeek: (clock) => `respecto a hace una semana, ${clock}`,
   differenceSince: (moment) => `respecto a ${moment}`,
 
   robotLayer: 'Robot',

@@ -10,7 +10,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   more: 'Más detalles',
 
   language: 'Idioma',
-  languageUnknown: (asked) => `Esta página no está disponible en «${asked}». Se muestra en inglés.`,
   languageMissing: (name) => `No se pudo cargar ${name}: la página se muestra en inglés.`,
   partsLate: 'Una parte de la página no se ha cargado.',
   partsLateHint:

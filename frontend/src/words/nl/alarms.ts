@@ -42,6 +42,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmAcknowledge: 'Bevestigen',
   alarmAll: (what, count) =>
     what.includes(' ') ? `${what}: alle (${count})` : `Alle ${what.toLowerCase()} (${count})`,
+  alarmAcknowledgedBy: (name, at) => `bevestigd door ${name}, ${at}`,
   alarmUnacknowledge: 'Bevestiging intrekken',
   alarmShelve: 'Uitstellen',
   alarmShelveHint: 'Tot dan geen melding, tenzij het erger wordt.',
@@ -226,6 +227,4 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'te laag' : `${by} te laag`),
   tooHigh: (by) => (by === null ? 'te hoog' : `${by} te hoog`),
   side: { below: 'laag', above: 'hoog' },
-  below: 'te laag',
-  above: 'te hoog',
 };

@@ -28,7 +28,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   oldest: (age) => `oudste meetwaarde ${age} geleden`,
   expected: (measured, expected) => `gemeten ${measured}, verwacht ${expected}`,
   leftOut: (sensor) => `${sensor}: mogelijke sensorfout, niet in de schatting gebruikt`,
-  advice: 'Voorgestelde meetpunten',
   advised: (place, percent, isFirst) =>
     isFirst
       ? `${place}: een meetpunt hier verlaagt de fout van de kaart tot ${percent} van de huidige`

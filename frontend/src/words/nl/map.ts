@@ -84,8 +84,6 @@ export const MAP: In<typeof EN.MAP> = {
   differenceNothing: (at) => `Geen gegevens van ${at}.`,
   differenceFailed: (reason) => `Geen verschil: ${reason}`,
   differenceTimes: (at, against) => `${at} vergeleken met ${against}`,
-  differenceSinceYesterday: (clock) => `ten opzichte van gisteren ${clock}`,
-  differenceSinceWeek: (clock) => `ten opzichte van vorige week, ${clock}`,
   differenceSince: (moment) => `ten opzichte van ${moment}`,
 
   robotLayer: 'Robot',

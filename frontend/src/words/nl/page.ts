@@ -10,7 +10,6 @@ export const PAGE: In<typeof EN.PAGE> = {
   more: 'Meer hierover',
 
   language: 'Taal',
-  languageUnknown: (asked) => `Deze pagina is er niet in “${asked}”. U ziet de Engelse versie.`,
   languageMissing: (name) => `${name} kon niet worden geladen: u ziet de Engelse versie.`,
   partsLate: 'Een deel van de pagina is niet geladen.',
   partsLateHint:

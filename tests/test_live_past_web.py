@@ -281,7 +281,7 @@ def test_a_copy_on_a_full_disk_is_reported_and_alarms_go_on(own: Apart, tmp_path
         own.peer.observe(*(scan(f"{n}", {"co2": 1.0, "x" * 200: 1.0}) for n in range(40)))
         told = live.get("/readyz").json().get("journal", {"state": "", "detail": ""})
         metric = f"\nlupin_journal_recording {float(state == 'recording')}\n"
-        is_why = ("copy" in told["detail"]) == (state == "failing")
+        is_why = (str(folder) in told["detail"]) == (state == "failing")
         return told["state"] == state and is_why and metric in live.get("/metrics").text
 
     def has_alarm(source: str) -> bool:

@@ -141,7 +141,7 @@ class FollowedLog:
             # After a single error, a damaged or foreign copy is deleted and made anew.
             was_failing, is_failing = is_failing, isinstance(pause_s, _FILE_ERRORS)
             self.fault = (
-                f"This bridge cannot copy the twin's journal: {pause_s}"
+                f"This bridge cannot copy the twin's journal to {self._folder}: {pause_s}"
                 if was_failing and is_failing
                 else ""
             )

@@ -33,7 +33,8 @@ from lupin_twin.core.drops import Rejected, check_texts
 
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
 MAX_TOPICS: Final = 100
-MAX_PAYLOAD_BYTES: Final = 65_536
+# Limit of a broker's packets. Without it, one message of another client may take 256 MB here.
+MAX_PACKET_BYTES: Final = 65_536
 # A moment in 2001. A device whose clock was never set starts in 1970.
 _EARLIEST_S: Final = 1e9
 _PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
@@ -127,13 +128,11 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
     """Parse a payload.
 
     Raises:
-        Rejected: a number is missing or out of range, or a name or the payload is too long.
+        Rejected: a number is missing or out of range, or a name is too long.
 
     """
     check_texts("tag", tag)
     check_texts("sensor", sensor)
-    if len(payload) > MAX_PAYLOAD_BYTES:
-        raise Rejected(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
     if pattern.is_availability:
         return Measured(tag, is_away=b"offline" in payload.lower())
     if pattern.names and payload in (_AWAY, _UNKNOWN):
@@ -198,7 +197,7 @@ def _password(table: Table, folder: Path) -> str:
         return ""
     try:
         with (folder / str(file)).open(encoding="utf-8") as opened:
-            return opened.read(MAX_PAYLOAD_BYTES).strip()
+            return opened.read(MAX_PACKET_BYTES).strip()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
         raise ConfigError(f"mqtt.password_file {file}: {reason}") from None
@@ -292,7 +291,9 @@ class MqttClient:
     def __init__(self, broker: Broker, wake: Callable[[], None]) -> None:
         try:
             from paho.mqtt.client import Client  # noqa: PLC0415  # needed only with a broker
-            from paho.mqtt.enums import CallbackAPIVersion  # noqa: PLC0415
+            from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion  # noqa: PLC0415
+            from paho.mqtt.packettypes import PacketTypes  # noqa: PLC0415
+            from paho.mqtt.properties import Properties  # noqa: PLC0415
         except ImportError:
             raise ConfigError(
                 "mqtt: the package paho-mqtt is not installed here: "
@@ -304,8 +305,13 @@ class MqttClient:
         self.lost = 0
         self.problem = f"not connected to {broker.host}:{broker.port} yet"
         self._client: Any = Client(
-            CallbackAPIVersion.VERSION2, client_id=f"lupin-adapt-{secrets.token_hex(6)}"
+            CallbackAPIVersion.VERSION2,
+            client_id=f"lupin-adapt-{secrets.token_hex(6)}",
+            protocol=MQTTProtocolVersion.MQTTv5,
         )
+        # The broker does not send larger packets (MQTT 5, 3.1.2.11.4).
+        self._limits = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+        self._limits.MaximumPacketSize = MAX_PACKET_BYTES
         if broker.user:
             self._client.username_pw_set(broker.user, broker.password or None)
         if broker.is_tls:
@@ -321,7 +327,7 @@ class MqttClient:
 
     def start(self) -> None:
         """Start a thread that connects."""
-        self._client.connect_async(self._broker.host, self._broker.port)
+        self._client.connect_async(self._broker.host, self._broker.port, properties=self._limits)
         self._client.loop_start()
 
     def stop(self) -> None:
@@ -353,7 +359,5 @@ class MqttClient:
     def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
         if len(self._waiting) == MAX_WAITING:
             self.lost += 1
-        # One byte more than the limit is kept, so that `measured` refuses the payload.
-        message.payload = bytes(message.payload[: MAX_PAYLOAD_BYTES + 1])
         self._waiting.append(message)
         self._wake()

@@ -174,14 +174,9 @@ class Audio {
 
 describe('sound', () => {
   const stubAudio = (audio: Audio): void => {
-    vi.stubGlobal(
-      'AudioContext',
-      class {
-        constructor() {
-          return audio;
-        }
-      },
-    );
+    vi.stubGlobal('AudioContext', function make() {
+      return audio;
+    });
   };
   const many = (count: number): Alarm[] =>
     Array.from({ length: count }, (_, at) =>

@@ -21,7 +21,11 @@ beforeEach(() => {
   moveViewport({ ...NO_VIEWPORT, size });
   onView = vi.fn<() => void>();
   onCamera = vi.fn<(camera: Camera | null) => void>();
+  element = document.createElement('div');
   stops = [
+    started((on) => {
+      camera = new MapCamera(element, false, on);
+    }),
     started((on) => onChange((state) => [state.viewport.view], onView, on)),
     started((on) =>
       onChange(
@@ -31,8 +35,6 @@ beforeEach(() => {
       ),
     ),
   ];
-  element = document.createElement('div');
-  camera = new MapCamera(element);
 });
 afterEach(() => {
   for (const stop of stops) stop();

@@ -182,6 +182,8 @@ def add_refusals(app: FastAPI) -> None:
         name, why = ".".join(map(str, where)), first["msg"]
         if first["type"] == "json_invalid":
             name, why = "", f"not JSON: {first['ctx']['error']}"
+        elif first["type"] == "model_attributes_type":  # also of another Content-Type
+            why = "expected a JSON object, sent as application/json"
         elif first["type"] == "string_pattern_mismatch":  # the only patterns of `routes_schema`
             why = "it contains a control character"
         return error_response(f"{name[:64] or 'the body'}: {why[0].lower()}{why[1:]}", 400)

@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from lupin_bridge.access.credentials import MAX_PASSWORD
 from lupin_bridge.stream.schema import Alarm, Contract, HistoryReading, Time
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH
 
@@ -36,7 +37,8 @@ class SignIn(_Given):
     """The body of `POST /api/signin`, for an account."""
 
     name: str
-    password: str
+    # Without a limit, pydantic takes half a surrogate pair, which has no UTF-8.
+    password: str = Field(max_length=MAX_PASSWORD)
 
 
 class _Keys(_Given):

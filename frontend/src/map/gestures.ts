@@ -40,6 +40,9 @@ export function watchGestures(
   const end = (): void => {
     if (presses.size === 0 && wheel === undefined) onEnd();
   };
+  const letGo = ({ pointerId }: PointerEvent): void => {
+    if (presses.delete(pointerId)) end();
+  };
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0 || event.ctrlKey) return;
     if (presses.size === 0) first = pointOf(event);
@@ -50,15 +53,17 @@ export function watchGestures(
   };
   const onPointerMove = (event: PointerEvent): void => {
     if (!presses.has(event.pointerId)) return;
+    // Its end is not reported while a context menu is open, or until other buttons are released.
+    if ((event.buttons & 1) === 0) {
+      letGo(event);
+      return;
+    }
     const before = grip();
     const at = pointOf(event);
     presses.set(event.pointerId, at);
     const after = grip();
     isClick &&= Math.hypot(at.x - first.x, at.y - first.y) <= CLICK_PX;
     onMove(before.middle, after.middle, after.spread / before.spread);
-  };
-  const letGo = ({ pointerId }: PointerEvent): void => {
-    if (presses.delete(pointerId)) end();
   };
   const onWheel = (event: WheelEvent): void => {
     event.preventDefault();

@@ -132,7 +132,7 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
         (b"{", "the body: not JSON: "),
         (b'{"tag_id": "bad", "readings": {"t": NaN}}', "readings.t: input should be a finite"),
         (b'{"tag_id": "bad", "readings": {"t": 1e999}}', ""),
-        ([], "the body: input should be"),
+        ([], "the body: expected a JSON object, sent as application/json"),
         ({**GOOD, "readings": {}}, "readings: dictionary should have at least 1"),
         ({**GOOD, "readings": {f"s{n}": 1 for n in range(65)}}, "readings: dictionary should hav"),
         ({**GOOD, "readings": {"t": "21"}}, "readings.t: input should be a valid number"),

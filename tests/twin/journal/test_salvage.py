@@ -16,7 +16,7 @@ from lupin_twin.journal.appending import Appender, simulated
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import kept
-from lupin_twin.journal.salvage import salvage
+from lupin_twin.journal.salvage import replace_journal, salvage
 from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer
 from tests.support.journal import (
     NOW,
@@ -81,6 +81,17 @@ def test_rows_in_the_wal_beside_it_are_salvaged_too(whole: Path, tmp_path: Path)
     new = salvaged(tmp_path / "damaged.sqlite")
     assert select(new, "SELECT value FROM meta WHERE key = 'last'") == [("word",)]
     assert scans(new) == scans(whole)
+
+
+def test_a_new_file_that_is_not_complete_replaces_nothing(damaged: Path, tmp_path: Path) -> None:
+    """As on a full disk: SQLite closes a file without an error, and its last rows stay in a WAL."""
+    new = tmp_path / "new"
+    before = damaged.read_bytes()
+    new.write_text("most rows")
+    new.with_name("new-wal").write_text("the last rows")
+    with pytest.raises(OSError, match="could not be moved"):
+        replace_journal(damaged, new, ".old")
+    assert damaged.read_bytes() == before
 
 
 @pytest.mark.parametrize("share", [0.9, 0.5, 0.3])

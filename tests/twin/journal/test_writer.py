@@ -15,6 +15,7 @@ import pytest
 
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Write
+from lupin_twin.journal.appending import prefill
 from lupin_twin.journal.paths import Syncing
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Turn
@@ -331,11 +332,15 @@ def test_a_salvage_that_was_killed_loses_nothing(
         with pytest.raises(KeyboardInterrupt):
             salvage(path)
     assert path.exists() is not bool(renamed)
+    if path.exists():
+        path.with_name("j.sqlite.new").write_text("killed before the old one was removed")
+    # Any program that writes, not the twin alone, finds the journal as it was.
+    assert not prefill(path, "the demo", [scan()], NOW)
+    assert not path.with_name("j.sqlite.new").exists()
     with recording(path) as journal:
         assert journal.take_restored(30.0) is not None
     salvage(path)
     assert select(path, "SELECT count(*) FROM scan WHERE is_copy = 0") == [(300,)]
-    assert not path.with_name("j.sqlite.new").exists()
 
 
 def test_a_failed_sync_is_reported_with_the_next_write(

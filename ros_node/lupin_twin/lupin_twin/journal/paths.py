@@ -59,6 +59,29 @@ def state_folder(environ: Mapping[str, str]) -> Path:
     return home / "lupin-twin"
 
 
+def finish_replacing(path: Path) -> None:
+    """Put a new file in the place of a journal that is gone, if there is one."""
+    if path.exists():  # killed before that: the new file would come back when this one is removed
+        ready(path).unlink(missing_ok=True)
+    elif ready(path).exists():
+        # SQLite would take them for those of the new file. Who reads the old one has them open, and
+        # nobody opens them meanwhile: there is no journal.
+        delete(path, "-wal", "-shm")
+        ready(path).rename(path)
+        sync(path.parent)
+
+
+def ready(path: Path) -> Path:
+    """A new file that is complete, and waits for the journal's place."""
+    return path.with_name(path.name + ".new")
+
+
+def delete(path: Path, *ends: str) -> None:
+    """Delete a file and those of SQLite beside it, or only those with these endings."""
+    for end in ends or ("", "-journal", "-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
+
+
 class InUse(Exception):
     """Another process writes this journal; the message names it."""
 
@@ -76,6 +99,8 @@ class Lock:
         self._descriptor = os.open(_beside(journal), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # Whoever writes next would begin an empty journal.
+            finish_replacing(journal)
         except BlockingIOError:
             other = _name_in(self._descriptor)
             os.close(self._descriptor)

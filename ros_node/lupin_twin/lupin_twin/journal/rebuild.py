@@ -22,9 +22,9 @@ from lupin_twin.journal.appending import LAST_SEQ, Appender, copy_known
 from lupin_twin.journal.checking import Progress, find_all_damage, size_of
 from lupin_twin.journal.counts import ADD_HOUR, DELETED
 from lupin_twin.journal.fold import copies
-from lupin_twin.journal.paths import writing_alone
+from lupin_twin.journal.paths import delete, writing_alone
 from lupin_twin.journal.runs import Run, put_run, runs
-from lupin_twin.journal.salvage import delete, replace_journal
+from lupin_twin.journal.salvage import replace_journal
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
     FILE_ERRORS,

@@ -8,6 +8,7 @@ as those of deleted rows do.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sqlite3
@@ -23,6 +24,7 @@ from urllib.parse import quote
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.checking import delete_wrong, size_of
 from lupin_twin.journal.counts import extent
+from lupin_twin.journal.paths import delete, finish_replacing, ready
 from lupin_twin.journal.retention import note_lost
 from lupin_twin.journal.rows import is_number
 from lupin_twin.journal.runs import runs
@@ -84,6 +86,8 @@ def replace_journal(path: Path, new: Path, end: str) -> Path:
     Returns that name. No data is deleted or overwritten. If this is killed, the old file is still
     in its place, or `finish_replacing` puts the new one there.
     """
+    if size_of(new.with_name(new.name + "-wal")):  # closing it reports no error
+        raise OSError(errno.ENOSPC, f"the WAL of {new} could not be moved into the file")
     sync(new)
     new.chmod(path.stat().st_mode & 0o777)
     for number in count():
@@ -95,24 +99,10 @@ def replace_journal(path: Path, new: Path, end: str) -> Path:
         if size_of(one) and not other.exists():
             _give_name(one, other)
     sync(path.parent)
-    new.rename(_ready(path))
+    new.rename(ready(path))
     path.unlink()
     finish_replacing(path)
     return old
-
-
-def finish_replacing(path: Path) -> None:
-    """Put a new file in the place of a journal that is gone, if there is one."""
-    if _ready(path).exists() and not path.exists():
-        # SQLite would take them for those of the new file. Who reads the old one has them open, and
-        # nobody opens them meanwhile: there is no journal.
-        delete(path, "-wal", "-shm")
-        _ready(path).rename(path)
-        sync(path.parent)
-
-
-def _ready(path: Path) -> Path:
-    return path.with_name(path.name + ".new")
 
 
 def _give_name(path: Path, other: Path) -> None:
@@ -127,12 +117,6 @@ def _give_name(path: Path, other: Path) -> None:
             part.unlink(missing_ok=True)
             raise
         part.rename(other)
-
-
-def delete(path: Path, *ends: str) -> None:
-    """Delete a file and those of SQLite beside it, or only those with these endings."""
-    for end in ends or ("", "-journal", "-wal", "-shm"):
-        path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def readable(
@@ -203,7 +187,8 @@ def salvage(path: Path) -> Path:
 
     """
     new, mended = (path.with_name(path.name + end) for end in (".salvage", ".mended"))
-    delete(new)
+    for left in (new, mended):  # by a salvage that was killed
+        delete(left)
     try:
         with closing(open_writer(new)) as target:
             with closing(_opened(path)) as old:

@@ -25,12 +25,12 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.checking import is_damaged
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
-from lupin_twin.journal.paths import InUse, Lock
+from lupin_twin.journal.paths import InUse, Lock, finish_replacing
 from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
-from lupin_twin.journal.salvage import finish_replacing, salvage
+from lupin_twin.journal.salvage import salvage
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 from lupin_twin.journal.writes import NoteQueue
 

@@ -64,8 +64,10 @@ def scans(path: Path) -> set[tuple[object, ...]]:
 
 
 def test_a_sound_file_is_salvaged_completely(whole: Path, damaged: Path) -> None:
+    damaged.with_name("damaged.sqlite.salvage").write_text("left by a salvage that was killed")
     new = salvaged(damaged)
     assert known(new) == known(whole)
+    assert select(new, "SELECT count(*) FROM meta WHERE key = 'lost_ns:1'") == [(1,)]
     for table in ("run", "series", "scan", "look", "place", "hour", "tally", "event"):
         every = f"SELECT * FROM {table}"
         if table != "run":  # reading the latest state starts a run

@@ -164,6 +164,8 @@ def test_closing_ends_a_job_that_may_not_begin_yet() -> None:
     queue = JobQueue("held", lambda: None)
     for _ in range(2):  # the second waits until the first answer is delivered
         queue.ask(lambda _: None, lambda _: None)
+    jobs = queue._workers.jobs
+    wait_for(lambda: [job.running() for job in tuple(jobs)] == [True], "one that waits")
     queue.close()
     wait_for(
         lambda: not any(thread.name.startswith("held") for thread in threading.enumerate()),

@@ -235,6 +235,38 @@ describe('camera', () => {
     expect(onClick).toHaveBeenCalledOnce();
   });
 
+  test('another button, or Ctrl for a menu, moves nothing; a cancelled finger is let go', () => {
+    camera.goTo({ x: 2, y: 4, span: 8 }, content);
+    const { view } = viewport();
+    for (const given of [{ button: 2 }, { ctrlKey: true }]) {
+      element.dispatchEvent(new PointerEvent('pointerdown', { pointerId: 1, ...given }));
+      mouse(element, 'pointermove', 40);
+      expect(viewport().view).toBe(view);
+    }
+    const capture = vi.spyOn(element, 'setPointerCapture');
+    mouse(element, 'pointerdown', 100);
+    expect(capture).toHaveBeenCalledWith(1);
+    mouse(element, 'pointercancel', 100);
+    mouse(element, 'pointermove', 140);
+    expect(viewport().view).toBe(view);
+  });
+
+  test.each([
+    ['wheel', { deltaY: -100 }, 2 ** 0.2],
+    ['wheel', { deltaY: -4, deltaMode: 1 }, 2 ** 0.2],
+    ['wheel', { deltaY: -10, ctrlKey: true }, 2 ** 0.2],
+    ['dblclick', {}, 2],
+    ['dblclick', { shiftKey: true }, 0.5],
+  ])('%s with %o zooms, and the page does not', (type, given, factor) => {
+    camera.goTo({ x: 2, y: 4, span: 4 }, content);
+    const { scale } = viewport().view;
+    const Kind = type === 'wheel' ? WheelEvent : MouseEvent;
+    const event = new Kind(type, { ...given, cancelable: true });
+    element.dispatchEvent(event);
+    expect(viewport().view.scale / scale).toBeCloseTo(factor);
+    expect(event.defaultPrevented).toBe(true);
+  });
+
   test('a click is no choice of a view', () => {
     camera.goTo(null, content);
     mouse(element, 'pointerdown', 100);

@@ -160,6 +160,19 @@ def test_closing_drops_waiting_jobs_stops_running_ones_and_ends_the_threads() ->
         running.submit(lambda _: None)
 
 
+def test_closing_ends_a_job_that_may_not_begin_yet() -> None:
+    queue = JobQueue("held", lambda: None)
+    for _ in range(2):  # the second waits until the first answer is delivered
+        queue.ask(lambda _: None, lambda _: None)
+    jobs = queue._workers.jobs
+    wait_for(lambda: [job.running() for job in tuple(jobs)] == [True], "one that waits")
+    queue.close()
+    wait_for(
+        lambda: not any(thread.name.startswith("held") for thread in threading.enumerate()),
+        "the end of its threads",
+    )
+
+
 def test_a_jobs_input_and_result_are_not_retained() -> None:
     class Thing:
         pass

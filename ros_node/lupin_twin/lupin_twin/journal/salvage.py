@@ -3,7 +3,7 @@
 
 SQLite itself reads the file, on both sides of each damaged page. With such a page, the new file
 loses its rows, and those of the pages that are reachable only through it. Counts of lost rows stay,
-as those of deleted rows do.
+as those of deleted rows do; lost counts are made again of the rows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from urllib.parse import quote
 
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.checking import delete_wrong, size_of
-from lupin_twin.journal.counts import extent
+from lupin_twin.journal.counts import count_rows, extent
 from lupin_twin.journal.paths import delete, finish_replacing, ready
 from lupin_twin.journal.retention import note_lost
 from lupin_twin.journal.rows import is_number
@@ -43,6 +43,7 @@ from lupin_twin.journal.schema import (
     set_meta,
     sync,
     transaction,
+    upsert_into,
 )
 
 # Rows that are read at once; around damage, fewer.
@@ -62,12 +63,8 @@ _SERIES_OF: Final = (
     " WHERE site = 'local'"
 )
 # Tables that are copied at once, and the column by which each is ordered.
-_ORDERS: Final = {
-    **dict.fromkeys(("run", "tally", "event"), "run"),
-    **dict.fromkeys(("series", "hour"), "series"),
-    "place": "seq",
-    "note": "id",
-}
+_ORDERS: Final = {"run": "run", "series": "series", "place": "seq", "note": "id"}
+_COUNTS: Final = {"hour": "series", "tally": "run", "event": "run"}
 _NO_RUN: Final = "run NOT IN (SELECT run FROM run)"
 _MEANINGLESS: Final = {
     "run": "joins NOT IN (SELECT run FROM run)",
@@ -253,14 +250,9 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
     with transaction(new):
         _copy_facts(old, new, size)
         for table, by in _ORDERS.items():
-            select = _ALL.format(table)
-            if table == "hour" and not old.execute(_HAS_SENSOR).fetchone():  # of version 4
-                of_lists = HOURS_OF_LISTS.format(lists=table, each="json_each(n) AS each")
-                select = f"{of_lists} AND site = 'local'"
-            _put(new, table, _both_ends(old, select, by))
+            _put(new, table, _both_ends(old, _ALL.format(table), by))
         _put(new, "series", _both_ends(old, _SERIES_OF, "run"))
-        for table, is_meaningless in _MEANINGLESS.items():
-            new.execute(f"DELETE FROM {table} WHERE {is_meaningless}")
+        _delete_meaningless(new)
     for table in WRITTEN:
         select, behind = f"SELECT seq, * FROM {table} WHERE site = 'local' AND", -1
         for lot in filter(None, readable(old, select, "seq")):
@@ -268,9 +260,24 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
             with transaction(new):
                 _put(new, table, (row[1:] for row in lot))
                 delete_wrong(new, table, behind, last)
+                count_rows(SiteLog(new), behind, last, {})
             behind = last
             # Move each lot into the file, so that the WAL does not grow.
             new.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+    # What was counted there includes rows that are gone; what cannot be read is counted again.
+    with transaction(new):
+        for table, by in _COUNTS.items():
+            select = _ALL.format(table)
+            if table == "hour" and not old.execute(_HAS_SENSOR).fetchone():  # of version 4
+                of_lists = HOURS_OF_LISTS.format(lists=table, each="json_each(n) AS each")
+                select = f"{of_lists} AND site = 'local'"
+            _put(new, table, _both_ends(old, select, by), upsert_into(table))
+        _delete_meaningless(new)
+
+
+def _delete_meaningless(new: sqlite3.Connection) -> None:
+    for table, is_meaningless in _MEANINGLESS.items():
+        new.execute(f"DELETE FROM {table} WHERE {is_meaningless}")
 
 
 def _both_ends(old: sqlite3.Connection, select: str, by: str) -> Iterator[Record]:
@@ -299,11 +306,13 @@ def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> 
     set_meta(new, LAST_SEQ, largest + 1_000_000)
 
 
-def _put(new: sqlite3.Connection, table: str, rows: Iterable[Record]) -> None:
+def _put(
+    new: sqlite3.Connection, table: str, rows: Iterable[Record], insert: str | None = None
+) -> None:
     """Put rows into a table of the new file, if each column is of its type."""
     types = [
         _TYPES[kind] if is_needed else (*_TYPES[kind], NoneType)
         for _, _, kind, is_needed, *_ in new.execute(f"PRAGMA table_info({table})").fetchall()
     ]
     fitting = (row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, types)))
-    new.executemany(f"{insert_into(table)} ON CONFLICT DO NOTHING", fitting)
+    new.executemany(insert or f"{insert_into(table)} ON CONFLICT DO NOTHING", fitting)

@@ -1,7 +1,7 @@
 """Queries the journal about the past, in any thread, over connections that cannot write.
 
 Abandoned queries end. A query that cannot be answered is refused with a remedy. Nothing has to be
-restarted when the cause is gone: each search opens the file, which takes half a millisecond.
+restarted when the cause is gone: each search checks whether the file is still the one that is open.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
+from lupin_twin.journal.paths import files_of
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -37,6 +38,10 @@ AnswerT = TypeVar("AnswerT")
 Search = Callable[[Any, ShouldStop], AnswerT]
 
 
+# A connection, and the files that it is to, see `files_of`.
+_Open = tuple[sqlite3.Connection, tuple[int, int]]
+
+
 class Recall:
     """Answers queries from construction to `close`; callers limit how many run at once.
 
@@ -54,6 +59,7 @@ class Recall:
         self._heal = heal
         self._max_s = max_s
         self._changed = threading.Condition()
+        self._idle: list[_Open] = []
         self._running = 0
         self._is_closed = False
 
@@ -62,6 +68,9 @@ class Recall:
         with self._changed:
             self._is_closed = True
             self._changed.wait_for(lambda: not self._running, _END_S)
+            idle, self._idle = self._idle, []
+        for connection, _ in idle:
+            connection.close()
 
     def answer(self, search: Search[AnswerT], is_abandoned: ShouldStop) -> AnswerT:
         """Run `search`, which sees the journal as of one moment.
@@ -89,6 +98,8 @@ class Recall:
                 connection.set_progress_handler(should_stop, _STEPS)
                 connection.execute("BEGIN")
                 answer = search(connection, should_stop)
+                connection.execute("ROLLBACK")
+                connection.set_progress_handler(None, _STEPS)
         except (*FILE_ERRORS, Foreign, OSError) as error:
             if not should_stop():
                 if is_damage_error(error):
@@ -103,24 +114,42 @@ class Recall:
 
     @contextmanager
     def _reading(self, path: Path, inode: int) -> Iterator[sqlite3.Connection]:
-        """A connection of its own."""
+        """A connection that nobody else uses meanwhile; without an error, it is used again."""
         with self._changed:
             if self._is_closed:
                 raise NotRemembered("the twin is ending")
             self._running += 1
+        opened: _Open | None = None
         try:
-            if inode not in (0, path.stat().st_ino):
-                # SQLite finds the WAL's index by its name, `-shm`. It would rebuild that under the
-                # writer, which has mapped it for the other file: SIGBUS.
-                raise NotRemembered(
-                    f"the journal {path} was replaced; the twin opens the new one within seconds"
-                )
-            with closing(open_reader(path)) as connection:
-                yield connection
+            opened = self._take(path, inode)
+            yield opened[0]
+            with self._changed:
+                if not self._is_closed:
+                    self._idle.append(opened)
+                    opened = None
         finally:
+            if opened is not None:
+                opened[0].close()
             with self._changed:
                 self._running -= 1
                 self._changed.notify_all()
+
+    def _take(self, path: Path, inode: int) -> _Open:
+        status = path.stat()
+        if inode not in (0, status.st_ino):
+            # SQLite finds the WAL's index by its name, `-shm`. It would rebuild that under the
+            # writer, which has mapped it for the other file: SIGBUS.
+            raise NotRemembered(
+                f"the journal {path} was replaced; the twin opens the new one within seconds"
+            )
+        files = files_of(path)
+        with self._changed:
+            while self._idle:
+                opened = self._idle.pop()
+                if opened[1] == files:
+                    return opened
+                opened[0].close()
+        return open_reader(path), files
 
 
 def _why_not(path: Path, error: Exception) -> Exception:

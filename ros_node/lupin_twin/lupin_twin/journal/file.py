@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
@@ -14,7 +14,6 @@ from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Write
-from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.appending import Appender, copy_known, simulated
 from lupin_twin.journal.checking import size_of
 from lupin_twin.journal.fold import Restored, copies, fold
@@ -66,7 +65,7 @@ class JournalFile:
         self.lost_log = ""
         self._path, self._log = path, path.with_name(path.name + "-wal")
         self._limits = limits
-        self._map: OccupancyMap | None = None
+        self._map: object = None
         self._map_rests_until_s = 0.0
         self._connection = open_writer(self._path)
         try:
@@ -97,13 +96,13 @@ class JournalFile:
         set_meta(self._connection, ORIGIN, world.origin)
         set_meta(self._connection, DAY_LENGTH, world.day_length_s)
 
-    def put_map(self, floor: OccupancyMap) -> None:
+    def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
         """Write the latest map, with this call or a later one; an empty text: it is too large."""
         now_s = time.monotonic()
         if floor is self._map or now_s < self._map_rests_until_s:
             return
         self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
-        text = text_of(floor)
+        text = text_of()
         if (get_meta(self._connection, MAP) or "") != text:
             set_meta(self._connection, MAP, text)
 

@@ -13,6 +13,7 @@ import time
 from collections import deque
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -21,7 +22,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.checking import is_damaged
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
@@ -314,7 +315,7 @@ class Journal:
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
                 if self._map is not None:
-                    file.put_map(self._map)
+                    file.put_map(self._map, partial(text_of, self._map))
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
                 self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):

@@ -341,8 +341,9 @@ def test_web_shows_the_same_notes_and_says_where_to_write_them(tmp_path: Path) -
             assert alarm["acknowledged_by"] == "anna"
             assert anna.get("/api/notes").json() == {"notes": [note]}
             assert not anna.get("/api/session").json()["can_write_notes"]
-            draft = {"kind": "comment", "subject": "site", "text": "seen"}
-            for method, path in (("POST", "/api/notes"), ("DELETE", f"/api/notes/{note['id']}")):
-                answer = anna.request(method, path, headers=OWN, json=draft)
+            for answer in (
+                write(anna, kind="comment", subject="site", text="seen"),
+                anna.delete(f"/api/notes/{note['id']}", headers=OWN),
+            ):
                 assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD")
                 assert "lupin-twin serve" in answer.json()["detail"]

@@ -70,7 +70,7 @@ test('its limit is that of now: what is critical; on the way back it stands besi
     todo: 'Heat, or close the vents',
   });
   expect(valuesOf(cold, C, at(18.02, 18, 'stressed', 18.5))).toMatchObject({
-    what: 'Temperature must rise above 18.5\u00a0°C',
+    what: 'Temperature not yet above 18.5\u00a0°C',
     todo: 'Keep an eye on it',
     now: 'now 18.0\u00a0°C',
     first: '17.9\u00a0°C when raised',

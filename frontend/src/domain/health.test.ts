@@ -148,18 +148,18 @@ describe('a reason in words', () => {
       // Within the ideal range of 18 to 26, but not far enough.
       { verdict: 'stressed', value: 18.1, limit: 18, ...held(18.4) } as const,
       null,
-      `Temperature 18.1${NBSP}°C, must rise above 18.4`,
+      `Temperature 18.1${NBSP}°C, not yet above 18.4`,
     ],
     [
       { verdict: 'stressed', value: 26, limit: 26, ...held(25.6) } as const,
       null,
-      `Temperature 26.0${NBSP}°C, must fall below 25.6`,
+      `Temperature 26.0${NBSP}°C, not yet below 25.6`,
     ],
     [
       // Only just within the critical limit of 10, and far from the ideal range.
       { value: 10.39, limit: 10, ...held(10.4) } as const,
       null,
-      `Temperature must rise above 10.4${NBSP}°C (critical)`,
+      `Temperature not yet above 10.4${NBSP}°C (critical)`,
     ],
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,

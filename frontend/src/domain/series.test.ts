@@ -15,9 +15,13 @@ import {
 
 const every10 = Array.from({ length: 3 }, (_, index) => readingAt(index * 10, index));
 
-test('a bucket stands in its middle, and never later than the period', () => {
+test('a bucket stands in its middle, and never later than the period, or in a gap', () => {
   expect(middleOf(bucketAt(0, 5), seriesWith({ bucketS: 10 }))).toBe(5);
   expect(middleOf(bucketAt(0, 5), seriesWith({ bucketS: 10, to: 4 }))).toBe(4);
+  // What it has was read before the gap, or after it.
+  const gaps = [{ from: 4, to: 27 }];
+  expect(middleOf(bucketAt(0, 5), seriesWith({ bucketS: 10, gaps, to: 90 }))).toBe(4);
+  expect(middleOf(bucketAt(20, 5), seriesWith({ bucketS: 10, gaps, to: 90 }))).toBe(27);
 });
 
 test('at a moment there is the reading that held, or the bucket that holds it, and nothing in a gap', () => {

@@ -69,9 +69,14 @@ export const marksOf = ({ buckets, bucket_s: widthS }: Timeline) =>
     ].flatMap(({ kind, count }) => (count > 0 ? [{ at: start, widthS, kind, count }] : [])),
   );
 
-/** Where a point is drawn: a bucket at its middle, but never after the series' end. */
-export const middleOf = ({ at }: Point, { bucketS, to }: Series): number =>
-  bucketS === null ? at : Math.max(at, Math.min(at + bucketS / 2, to));
+/** Where a point is drawn: a bucket at its middle, but never after the series' end, or in a gap. */
+export function middleOf({ at }: Point, { bucketS, gaps, to }: Series): number {
+  if (bucketS === null) return at;
+  const middle = Math.max(at, Math.min(at + bucketS / 2, to));
+  const gap = gaps.find((span) => middle > span.from && middle < span.to);
+  if (!gap) return middle;
+  return gap.from >= at ? gap.from : gap.to;
+}
 
 /** The series at a moment: the reading valid then, or its bucket; null: a gap. */
 export function pointAt(series: Series, moment: number): Point | null {

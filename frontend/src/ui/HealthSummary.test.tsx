@@ -212,7 +212,7 @@ test('what is back in its range is to be watched', () => {
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, must rise above 18.5Keep an eye on it',
+    'StressedTag 5: Temperature 18.1\u00a0°C, not yet above 18.5Keep an eye on it',
   );
 });
 

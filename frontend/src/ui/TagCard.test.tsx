@@ -155,7 +155,7 @@ describe('card', () => {
         <TagTable />
       </>,
     );
-    expect(screen.getAllByText(/must rise above 18\.5/).length).toBeGreaterThan(0);
+    expect(screen.getAllByText(/not yet above 18\.5/).length).toBeGreaterThan(0);
     const ideal = document.querySelector<HTMLElement>('.card-ideal');
     expect(ideal?.textContent).toMatch(/^daytime ideal/);
     expect(ideal?.dataset['health']).toBeUndefined();

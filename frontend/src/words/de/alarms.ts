@@ -134,8 +134,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     must: {
-      below: (limit) => `muss über ${limit}`,
-      above: (limit) => `muss unter ${limit}`,
+      below: (limit) => `noch nicht über ${limit}`,
+      above: (limit) => `noch nicht unter ${limit}`,
     },
     just: {
       below: (limit) => `knapp unter ${limit}`,
@@ -176,7 +176,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       light: { below: 'Assimilationslicht einschalten', above: 'Schattieren' },
       soil_moisture: { below: 'Gießen', above: 'Weniger gießen, Drainage prüfen' },
     },
-    air: { damp: 'Lüften und heizen', dry: 'Befeuchten oder schattieren' },
+    air: { damp: 'Lüften und heizen', dry: 'Befeuchten' },
     range: 'Klimaregelung prüfen',
     watch: 'Beobachten',
     reading_failed: 'Sensor prüfen',

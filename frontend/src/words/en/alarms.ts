@@ -141,8 +141,8 @@ export const HEALTH = {
     sides: { below: 'below', above: 'above' },
     /** A value that was out of range keeps its status until it is well within (hysteresis). */
     must: {
-      below: (limit: string): string => `must rise above ${limit}`,
-      above: (limit: string): string => `must fall below ${limit}`,
+      below: (limit: string): string => `not yet above ${limit}`,
+      above: (limit: string): string => `not yet below ${limit}`,
     },
     /** For a value beyond its limit that rounds to the limit. */
     just: {
@@ -184,7 +184,7 @@ export const HEALTH = {
       light: { below: 'Switch on the lamps', above: 'Shade' },
       soil_moisture: { below: 'Irrigate', above: 'Irrigate less; check the drainage' },
     },
-    air: { damp: 'Ventilate and heat', dry: 'Mist, damp down or shade' },
+    air: { damp: 'Ventilate and heat', dry: 'Mist or damp down' },
     range: 'Check the climate settings',
     /** For a value that is back in its range, but not far enough inside yet. */
     watch: 'Keep an eye on it',

@@ -135,8 +135,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
     must: {
-      below: (limit) => `debe superar ${limit}`,
-      above: (limit) => `debe bajar de ${limit}`,
+      below: (limit) => `aún no supera ${limit}`,
+      above: (limit) => `aún no baja de ${limit}`,
     },
     just: {
       below: (limit) => `justo bajo ${limit}`,
@@ -183,7 +183,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       light: { below: 'Encender la iluminación', above: 'Sombrear' },
       soil_moisture: { below: 'Regar', above: 'Regar menos y revisar el drenaje' },
     },
-    air: { damp: 'Ventilar y calefactar', dry: 'Humidificar o sombrear' },
+    air: { damp: 'Ventilar y calefactar', dry: 'Humidificar' },
     range: 'Revisar el control del clima',
     watch: 'Vigilar',
     reading_failed: 'Revisar el sensor',

@@ -127,8 +127,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     must: {
-      below: (limit) => `moet boven ${limit}`,
-      above: (limit) => `moet onder ${limit}`,
+      below: (limit) => `nog niet boven ${limit}`,
+      above: (limit) => `nog niet onder ${limit}`,
     },
     just: {
       below: (limit) => `net onder ${limit}`,
@@ -170,7 +170,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       light: { below: 'Belichting aanzetten', above: 'Schermen' },
       soil_moisture: { below: 'Water geven', above: 'Minder water geven, drain controleren' },
     },
-    air: { damp: 'Luchten en stoken', dry: 'Bevochtigen of schermen' },
+    air: { damp: 'Luchten en stoken', dry: 'Bevochtigen' },
     range: 'Klimaatregeling controleren',
     watch: 'In de gaten houden',
     reading_failed: 'Sensor controleren',
